@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "input/mesh_decoder.h"
 #include "input/short_text.h"
 
 namespace dccd {
@@ -105,6 +106,41 @@ std::size_t joinEnds(bool joins, SoupWeld& weld, Ropes& ropes) {
   const auto has_no_length = [](const Edge& edge) { return edge[0] == edge[1]; };
   ropes.edges.erase(std::remove_if(ropes.edges.begin(), ropes.edges.end(), has_no_length), ropes.edges.end());
   return apart;
+}
+
+DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
+  DecodedMesh mesh;
+  start(markers[0]->header, mesh);
+  std::size_t count = 0;
+  for (const MarkerView* one : markers) {
+    DecodedMesh other;
+    start(one->header, other);
+    if (other.frame_id != mesh.frame_id) {
+      throw MeshError(StepStatus::BAD_MESSAGE, "marker " + nameOf(*one) + " is in frame '" + other.frame_id +
+                                                   "', and " + nameOf(*markers[0]) + " in frame '" + mesh.frame_id +
+                                                   "'; publish the ropes of a message in one frame");
+    }
+    count += one->points.size;
+  }
+  checkCount(count);
+  Ropes ropes = ropesOf(markers);
+  if (hasFixedTopology()) {
+    mesh.positions = std::move(ropes.points);
+    takeFixed(count, 0, 0, mesh);
+    addRadii(nullptr, mesh);
+    return mesh;
+  }
+  SoupWeld weld = continues(known_ropes_, ropes.names) ? weld_ : SoupWeld();
+  mesh.weld_changes = joinEnds(config_.weld, weld, ropes);
+  if (ropes.edges.empty()) {
+    throw MeshError(StepStatus::BAD_MESSAGE, "there is nothing to check: the lines have no length");
+  }
+  mesh.positions = std::move(ropes.points);
+  addRadii(nullptr, mesh);
+  takeLines(ropes.edges, mesh);
+  weld_ = std::move(weld);
+  known_ropes_ = std::move(ropes.names);
+  return mesh;
 }
 
 }  // namespace dccd

@@ -82,35 +82,26 @@ std::string rowStepRemark(const CloudView& cloud) {
 
 MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)) {}
 
-template <typename View>
-DecodedMesh MeshDecoder::decodeAs(const std::string& datatype, View view) {
+DecodedMesh MeshDecoder::decode(const std::string& datatype, WireSpan<std::uint8_t> bytes, const TypedMesh& object) {
   const MeshType* type = findMeshType(datatype);
   if (!type) refuse(meshTypeProblem(datatype, {}));
   if (config_.type != "auto" && config_.type != type->name) {
     refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
   }
   try {
-    const auto viewed = view(*type);
-    if (config_.source == TopologySource::DEPTH_IMAGE && !std::holds_alternative<CloudView>(viewed)) {
+    WireReader wire(bytes.data, bytes.size);
+    wire.limitEntries(config_.max_faces);
+    const MeshView view =
+        object.type ? type->view(object.message.get(), config_.noise_field) : type->read(wire, config_.noise_field);
+    if (config_.source == TopologySource::DEPTH_IMAGE && !std::holds_alternative<CloudView>(view)) {
       refuse("topology/source depth_image is for the points of a depth camera, and " + datatype + " arrives");
     }
-    return std::visit([this](const auto& mesh) { return decodeView(mesh); }, viewed);
+    return std::visit([this](const auto& mesh) { return decodeView(mesh); }, view);
   } catch (const WireError& error) {
     refuse(datatype + ": " + error.what());
   } catch (const TopologyError& error) {
     refuse(datatype + ": " + error.what());
   }
-}
-
-DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
-  WireReader wire(data, size);
-  wire.limitEntries(config_.max_faces);
-  return decodeAs(datatype, [&](const MeshType& type) { return type.read(wire, config_.noise_field); });
-}
-
-DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
-  return decodeAs(message.type->datatype,
-                  [&](const MeshType& type) { return type.view(message.message.get(), config_.noise_field); });
 }
 
 void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel) const {
@@ -365,38 +356,6 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
   refuse("no " + std::string(config_.source == TopologySource::POLYLINE ? "" : "TRIANGLE_LIST marker and no ") +
          "LINE_STRIP, LINE_LIST or POINTS with the wanted namespace and id; there are (namespace, id, type):" +
          (seen.empty() ? " none" : seen));
-}
-
-DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
-  DecodedMesh mesh;
-  start(markers[0]->header, mesh);
-  std::size_t count = 0;
-  for (const MarkerView* one : markers) {
-    DecodedMesh other;
-    start(one->header, other);
-    if (other.frame_id != mesh.frame_id) {
-      refuse("marker " + nameOf(*one) + " is in frame '" + other.frame_id + "', and " + nameOf(*markers[0]) +
-             " in frame '" + mesh.frame_id + "'; publish the ropes of a message in one frame");
-    }
-    count += one->points.size;
-  }
-  checkCount(count);
-  Ropes ropes = ropesOf(markers);
-  if (hasFixedTopology()) {
-    mesh.positions = std::move(ropes.points);
-    takeFixed(count, 0, 0, mesh);
-    addRadii(nullptr, mesh);
-    return mesh;
-  }
-  SoupWeld weld = continues(known_ropes_, ropes.names) ? weld_ : SoupWeld();
-  mesh.weld_changes = joinEnds(config_.weld, weld, ropes);
-  if (ropes.edges.empty()) refuse("there is nothing to check: the lines have no length");
-  mesh.positions = std::move(ropes.points);
-  addRadii(nullptr, mesh);
-  takeLines(ropes.edges, mesh);
-  weld_ = std::move(weld);
-  known_ropes_ = std::move(ropes.names);
-  return mesh;
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {

@@ -60,11 +60,9 @@ class MeshDecoder {
  public:
   explicit MeshDecoder(MeshInputConfig config);
 
-  /// `datatype` as in the connection header, package/Name. Throws MeshError; after one the
-  /// decoder is as before.
-  DecodedMesh decode(const std::string& datatype, const std::uint8_t* data, std::size_t size);
-  /// The same of a message that was never serialised.
-  DecodedMesh decode(const TypedMesh& message);
+  /// `datatype` as in the connection header, package/Name. `object`: in place of bytes, of a message that was never
+  /// serialised. Throws MeshError; after one the decoder is as before.
+  DecodedMesh decode(const std::string& datatype, WireSpan<std::uint8_t> bytes, const TypedMesh& object = {});
   /// The next triangle soup is welded as a first one, and so are the ends of lines.
   void forgetWeld() {
     weld_.forget();
@@ -84,14 +82,12 @@ class MeshDecoder {
   SoupWeld weld_;                      // of a triangle soup's corners, or of the ends of lines
   std::vector<RopeName> known_ropes_;  // of the last markers that were read
 
-  template <typename View>
-  DecodedMesh decodeAs(const std::string& datatype, View view);
   DecodedMesh decodeView(const CloudView& cloud);
   DecodedMesh decodeView(const IndexedView& mesh);
   DecodedMesh decodeView(const std::vector<MarkerView>& markers);
   DecodedMesh decodeDepthImage(const CloudView& cloud) const;
   DecodedMesh decodeSoup(const MarkerView& marker);
-  DecodedMesh decodeRopes(std::vector<const MarkerView*> markers);
+  DecodedMesh decodeRopes(std::vector<const MarkerView*> markers);  // in marker_ropes.cpp
   bool isRope(const CloudView& cloud) const;
   bool hasFixedTopology() const;
   void checkFaces(std::size_t count) const;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <exception>
 #include <utility>
 
 #include <ros/console.h>
@@ -41,6 +40,10 @@ bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
 
 }  // namespace
 
+void tellLost(const std::string& topic, const std::exception& error) {
+  ROS_WARN_STREAM_THROTTLE(5, topic << ": a message was lost: " << error.what());
+}
+
 MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topic, Callback callback)
     : node_(node), topic_(node_.resolveName(topic)), callback_(std::move(callback)), last_message_ns_(steadyNs()) {
   open(nullptr);
@@ -60,22 +63,11 @@ void MeshSubscription::close() {
   typed.shutdown();
 }
 
-/// Nothing may get out of a callback: the thread would end, and the process with it.
-template <class Take>
-void MeshSubscription::guarded(Take take) {
-  try {
-    take();
-  } catch (const std::exception& error) {
-    ROS_WARN_STREAM_THROTTLE(5, topic_ << ": a message was lost: " << error.what());
-  }
-}
-
 void MeshSubscription::open(const MeshType* type) {
   close();
   ros::SubscribeOptions options;
   options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
-      topic_, SUBSCRIBER_QUEUE,
-      [this](const ros::MessageEvent<const ShapeShifter>& event) { guarded([&] { onAny(event); }); });
+      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onAny(event); });
   if (type) {
     options.md5sum = type->md5;
     options.datatype = type->datatype;
@@ -86,39 +78,44 @@ void MeshSubscription::open(const MeshType* type) {
   any_ = std::move(opened);
 }
 
-void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event) {
-  const ShapeShifter::ConstPtr message = event.getConstMessage();
+void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event) try {
+  const ShapeShifter::ConstPtr bytes = event.getConstMessage();
   ros::Subscriber ended;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     last_message_ns_ = steadyNs();
     has_type_ = true;  // the publisher may come and go between two looks
-    heard_type_ = message->getDataType();
-    if (typed_) {
-      if (!held_.empty() && isSame(*message, held_.front())) {
-        ended = endOverlap();
-      } else {
-        last_bytes_ = message;
-        deliver(*message);
-      }
+    heard_type_ = bytes->getDataType();
+    // Before any_ is known there is nothing to narrow: the first message may overtake open().
+    if (!typed_ && any_ && event.getPublisherName() == ros::this_node::getName() &&
+        meshTypeProblem(heard_type_, bytes->getMD5Sum()).empty()) {
+      narrowTo(*findMeshType(heard_type_));
+    }
+    if (typed_ && !held_.empty() && isSame(*bytes, held_.front())) {
+      ended = endOverlap();
     } else {
-      // Before any_ is known there is nothing to narrow: the first message may overtake open().
-      if (any_ && event.getPublisherName() == ros::this_node::getName() &&
-          meshTypeProblem(message->getDataType(), message->getMD5Sum()).empty()) {
-        narrowTo(*findMeshType(message->getDataType()));
-        last_bytes_ = message;
+      if (typed_) last_bytes_ = bytes;
+      MeshMessage message;
+      message.datatype = heard_type_;
+      message.md5 = bytes->getMD5Sum();
+      if (hasMemoryFor(bytes->size())) {
+        message.bytes = bytesOf(*bytes);
+      } else {
+        message.no_memory = bytes->size();
       }
-      deliver(*message);
+      callback_(std::move(message));
     }
   }
   ended.shutdown();
+} catch (const std::exception& error) {
+  tellLost(topic_, error);
 }
 
 /// Until the first subscription is closed, every message comes both ways: as an object at once, as bytes a little
 /// later. An object thus overtakes the bytes of the messages before it. To keep the order, the first objects are held
 /// back until their bytes have come. A message that was on its way as bytes when the second subscription was made comes
 /// through both: what the second brings of it is dropped here, even behind objects that overtook it.
-void MeshSubscription::onTyped(TypedMesh message) {
+void MeshSubscription::onTyped(TypedMesh message) try {
   ros::Subscriber ended;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -132,6 +129,8 @@ void MeshSubscription::onTyped(TypedMesh message) {
     }
   }
   ended.shutdown();
+} catch (const std::exception& error) {
+  tellLost(topic_, error);
 }
 
 ros::Subscriber MeshSubscription::endOverlap() {
@@ -139,18 +138,6 @@ ros::Subscriber MeshSubscription::endOverlap() {
   for (TypedMesh& message : held_) deliver(std::move(message));
   held_.clear();
   return std::exchange(any_, {});
-}
-
-void MeshSubscription::deliver(const ShapeShifter& bytes) {
-  MeshMessage message;
-  message.datatype = bytes.getDataType();
-  message.md5 = bytes.getMD5Sum();
-  if (hasMemoryFor(bytes.size())) {
-    message.bytes = bytesOf(bytes);
-  } else {
-    message.no_memory = bytes.size();
-  }
-  callback_(std::move(message));
 }
 
 void MeshSubscription::deliver(TypedMesh object) {
@@ -164,8 +151,7 @@ void MeshSubscription::deliver(TypedMesh object) {
 void MeshSubscription::narrowTo(const MeshType& type) {
   narrowed_at_ = ros::SteadyTime::now();
   ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
-  options.helper =
-      type.callbackHelper(type, [this](TypedMesh message) { guarded([&] { onTyped(std::move(message)); }); });
+  options.helper = type.callbackHelper(type, [this](TypedMesh message) { onTyped(std::move(message)); });
   options.transport_hints = ros::TransportHints().tcpNoDelay();
   typed_ = node_.subscribe(options);
 }

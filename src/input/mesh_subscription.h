@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -71,15 +72,15 @@ class MeshSubscription {
   void open(const MeshType* type);
   void close();
   void attempt(const std::string& published_type);
-  template <class Take>
-  void guarded(Take take);
   void onAny(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
   void onTyped(TypedMesh message);
   void narrowTo(const MeshType& type);
   /// The mutex is held. What was held back is delivered; the subscription to be shut down when it is not held any more.
   ros::Subscriber endOverlap();
-  void deliver(const topic_tools::ShapeShifter& bytes);
   void deliver(TypedMesh object);
 };
+
+/// For every callback of a topic: nothing may get out of one, or the thread would end, and the process with it.
+void tellLost(const std::string& topic, const std::exception& error);
 
 }  // namespace dccd

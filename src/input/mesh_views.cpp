@@ -41,19 +41,6 @@ CloudView::Coordinate fieldOf(std::string_view name, std::size_t offset, std::ui
   return {offset, datatype == FLOAT64};
 }
 
-void readFields(WireReader& wire, const std::string& extra_field, CloudView& cloud) {
-  CloudFieldFinder finder(extra_field);
-  const std::size_t count = wire.readCount("fields", 4 + 4 + 1 + 4);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::string_view name = wire.readString("fields.name");
-    const std::size_t offset = wire.read<std::uint32_t>("fields.offset");
-    const auto datatype = wire.read<std::uint8_t>("fields.datatype");
-    wire.skip(4, "fields.count");
-    finder.add(name, offset, datatype, cloud);
-  }
-  finder.finish(cloud);
-}
-
 }  // namespace
 
 void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud) {
@@ -122,7 +109,16 @@ CloudView readCloud(WireReader& wire, const std::string& extra_field) {
   cloud.header = readHeader(wire);
   cloud.height = wire.read<std::uint32_t>("height");
   cloud.width = wire.read<std::uint32_t>("width");
-  readFields(wire, extra_field, cloud);
+  CloudFieldFinder finder(extra_field);
+  const std::size_t count = wire.readCount("fields", 4 + 4 + 1 + 4);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string_view name = wire.readString("fields.name");
+    const std::size_t offset = wire.read<std::uint32_t>("fields.offset");
+    const auto datatype = wire.read<std::uint8_t>("fields.datatype");
+    wire.skip(4, "fields.count");
+    finder.add(name, offset, datatype, cloud);
+  }
+  finder.finish(cloud);
   cloud.big_endian = wire.read<std::uint8_t>("is_bigendian") != 0;
   cloud.point_step = wire.read<std::uint32_t>("point_step");
   cloud.row_step = wire.read<std::uint32_t>("row_step");

@@ -107,6 +107,12 @@ void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, c
   if (told_.insert(child).second) complaints_.push_back(text);
 }
 
+std::string TransformFeed::noTransform(const std::string& from, const std::string& to, const std::string& why) const {
+  const std::string unusable = onlyUnusable();
+  return "no transform from '" + from + "' to " + to + ": " + shortText(why) +
+         (unusable.empty() ? "" : "; " + shortText(unusable));
+}
+
 std::string TransformFeed::onlyUnusable() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::string text;

@@ -55,6 +55,9 @@ class TransformFeed {
 
   /// How many transforms could not be used.
   std::uint64_t unusable() const { return unusable_; }
+  /// After a lookup() that failed: "no transform from 'a' to …: why", and which frames have had but unusable ones.
+  /// `to`: in words, a name in quotation marks.
+  std::string noTransform(const std::string& from, const std::string& to, const std::string& why) const;
   /// Which frames have had no others, and why, in words; empty: none.
   std::string onlyUnusable() const;
   /// A line for each child frame that has had an unusable one, once.

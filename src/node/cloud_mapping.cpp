@@ -1,7 +1,6 @@
 #include "node/cloud_mapping.h"
 
 #include "input/mesh_views.h"
-#include "input/short_text.h"
 #include "input/wire.h"
 #include "node/map_decode.h"
 
@@ -24,10 +23,8 @@ Positions CloudMapping::place(const std::vector<std::uint8_t>& bytes, StampNs re
   std::string reason;
   while (!transforms_.lookup(frame_, frame, map.stamp_ns, map_from_sensor, reason)) {
     if (may_wait()) continue;
-    const std::string unusable = transforms_.onlyUnusable();
-    throw WireError("no transform from '" + frame + "' to '" + frame_ + "': " + shortText(reason) +
-                    (unusable.empty() ? "" : "; " + shortText(unusable)) + "; the clouds on " + config_.cloud_topic +
-                    " need it");
+    throw WireError(transforms_.noTransform(frame, "'" + frame_ + "'", reason) + "; the clouds on " +
+                    config_.cloud_topic + " need it");
   }
   Positions points;
   points.reserve(cloud.size());

@@ -2,19 +2,11 @@
 
 #include <cstdlib>
 
-#include <deformable_ccd/AttachObject.h>
-#include <deformable_ccd/DetachObject.h>
-#include <deformable_ccd/RemoveObject.h>
-#include <deformable_ccd/SetHold.h>
-#include <deformable_ccd/SetPhase.h>
 #include <std_msgs/Bool.h>
-#include <std_srvs/SetBool.h>
-#include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "dccd/simd_target.h"
 #include "input/message_bytes.h"
-#include "input/short_text.h"
 #include "node/robot_source.h"
 
 namespace dccd {
@@ -23,7 +15,6 @@ namespace {
 using topic_tools::ShapeShifter;
 
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
-constexpr double SERVICE_TIMEOUT_S = 10;
 // Of the second in which the process is to end.
 constexpr std::chrono::milliseconds END_AFTER{700};
 
@@ -36,10 +27,10 @@ class EarlyState {
       state_ = node_.advertise<deformable_ccd::State>("state", TOPIC_QUEUE, true);
       clear_ = node_.advertise<std_msgs::Bool>("clear", TOPIC_QUEUE, true);
     }
-    Assurance assurance;
-    assurance.missing.push_back(reason);
+    Statement statement;
+    statement.assurance.missing.push_back(reason);
     deformable_ccd::State message = toState(Outcome(), "");
-    fillState(assurance, "", "", message);
+    fillState(statement, message);
     message.header.stamp = ros::Time::now();
     clear_.publish(std_msgs::Bool());
     state_.publish(message);
@@ -110,12 +101,14 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
-void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) {
+void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) try {
   feed.add(message, is_static);
   for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
+} catch (const std::exception& error) {
+  tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 
-void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
+void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) try {
   map_publisher_seen = true;
   const std::int64_t now_ns = steadyNs();
   state.mapCame(now_ns);
@@ -126,15 +119,8 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
                         now_ns);
   }
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns);
-}
-
-/// Nothing may get out of a callback: the thread would end, and the process with it.
-void CollisionMonitor::Impl::guarded(const std::string& topic, const std::function<void()>& take) {
-  try {
-    take();
-  } catch (const std::exception& error) {
-    ROS_WARN_STREAM_THROTTLE(5, topic << ": a message was lost: " << error.what());
-  }
+} catch (const std::exception& error) {
+  tellLost(config.liveMapName(), error);
 }
 
 void CollisionMonitor::Impl::subscribe() {
@@ -148,156 +134,17 @@ void CollisionMonitor::Impl::subscribe() {
         input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { onTransforms(*m, false); }); },
+      "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { onTransforms(*m, false); },
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { onTransforms(*m, true); }); });
+      "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { onTransforms(*m, true); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });
   if (config.takesMapFileAlone()) return maps->submitFile(config.octomap_file, steadyNs());
   if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), steadyNs());
-  map_subscriber = input.subscribe<ShapeShifter>(config.liveMapName(), 2, [this](const ShapeShifter::ConstPtr& m) {
-    guarded(config.liveMapName(), [&] { onMap(m); });
-  });
-}
-
-// --- service thread --------------------------------------------------------------------------------------------------
-
-void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
-  using Trigger = std_srvs::Trigger;
-  using SetBool = std_srvs::SetBool;
-  const auto answer = [this](const std::function<Reply()>& run, auto& response) {
-    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-    response.success = reply.success;
-    response.message = reply.message;
-    return true;
-  };
-  const auto advertise = [&](const char* name, const std::function<Reply()>& run) {
-    services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
-        name, [answer, run](Trigger::Request&, Trigger::Response& response) { return answer(run, response); }));
-  };
-  advertise("check_now", [this] {
-    const Outcome outcome = pipeline.checkNow();
-    return Reply{outcome.answered, describe(outcome)};
-  });
-  advertise("record_step", [this] {
-    Reply reply;
-    reply.success = recorder.record(reply.message);
-    return reply;
-  });
-  services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
-      "reset", [this, answer](Trigger::Request&, Trigger::Response& response) {
-        state.asked("a reset was asked for");
-        const auto run = [this] {
-          resetNow(StepStatus::RESET);
-          return Reply{true, "frames forgotten; the next one is a first frame"};
-        };
-        return answer(run, response);
-      }));
-  services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
-      "enable", [this, answer](SetBool::Request& request, SetBool::Response& response) {
-        enabled = request.data;
-        state.setEnabled(enabled);
-        state.asked("~enable was called");
-        const auto run = [this, on = request.data] {
-          resetNow(StepStatus::DISABLED);
-          return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
-        };
-        return answer(run, response);
-      }));
-}
-
-/// What is expected, by the phase of the task and by what hands hold.
-void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
-  using deformable_ccd::SetHold;
-  using deformable_ccd::SetPhase;
-  const auto answer = [this](const std::function<void()>& set, auto& response) {
-    const auto run = [this, set] {
-      try {
-        set();
-      } catch (const ParameterError& error) {
-        return Reply{false, error.what() + std::string("; in force is ") + pipeline.phaseInWords()};
-      }
-      return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
-    };
-    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-    response.success = reply.success;
-    response.message = reply.message;
-    return true;
-  };
-  services.push_back(service.advertiseService<SetPhase::Request, SetPhase::Response>(
-      "set_phase", [this, answer](SetPhase::Request& request, SetPhase::Response& response) {
-        return answer([this, phase = request.phase] { pipeline.setPhase(phase); }, response);
-      }));
-  services.push_back(service.advertiseService<SetHold::Request, SetHold::Response>(
-      "set_hold", [this, answer](SetHold::Request& request, SetHold::Response& response) {
-        return answer([this, request] { pipeline.setHold(request.body, request.by, request.holds); }, response);
-      }));
-}
-
-void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
-  using deformable_ccd::AttachObject;
-  using deformable_ccd::DetachObject;
-  using deformable_ccd::RemoveObject;
-  // What is refused is counted, be it on this thread, where meshes are read, or on the worker's.
-  const auto answer = [this](const std::string& done, const std::function<std::function<void()>()>& read,
-                             auto& response) {
-    Reply reply;
-    try {
-      const std::function<void()> change = read();
-      reply = queue.call([change, done] { return change(), Reply{true, done}; }, SERVICE_TIMEOUT_S);
-    } catch (const std::exception& error) {
-      reply.message = error.what();
-    }
-    requests_refused += !reply.success;
-    response.success = reply.success;
-    response.message = shortText(reply.message);
-    return true;
-  };
-  services.push_back(service.advertiseService<AttachObject::Request, AttachObject::Response>(
-      "attach", [this, answer](AttachObject::Request& request, AttachObject::Response& response) {
-        const auto read = [&] {
-          return [this, object = readAttach(request, config)] {
-            pipeline.attach(object);
-            state.takeBack("no step has been answered since '" + object.name + "' was attached");
-          };
-        };
-        return answer("from the next step on '" + request.name + "' moves with " + request.link, read, response);
-      }));
-  services.push_back(service.advertiseService<DetachObject::Request, DetachObject::Response>(
-      "detach", [this, answer](DetachObject::Request& request, DetachObject::Response& response) {
-        const auto read = [&] { return [this, name = request.name] { pipeline.detach(name); }; };
-        return answer("from the next step on '" + request.name + "' stays where it is", read, response);
-      }));
-  services.push_back(service.advertiseService<RemoveObject::Request, RemoveObject::Response>(
-      "remove", [this, answer](RemoveObject::Request& request, RemoveObject::Response& response) {
-        const auto read = [&] { return [this, name = request.name] { pipeline.remove(name); }; };
-        return answer("'" + request.name + "' is forgotten", read, response);
-      }));
-}
-
-void CollisionMonitor::Impl::listenToChanges(const ros::NodeHandle& service) {
-  Reconfigure::Events events;
-  events.change = [this](const Reconfigure::Change& change) -> std::string {
-    // Nobody knows what a worker will say that is busy for too long: then it is not to do it any more.
-    const auto is_wanted = std::make_shared<std::atomic<bool>>(true);
-    const auto run = [this, change, is_wanted] {
-      if (!*is_wanted) return Reply{};
-      pipeline.reconfigure(change);
-      state.setLimits(livenessLimits(config));
-      return Reply{true, ""};
-    };
-    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-    *is_wanted = false;
-    return reply.success ? "" : reply.message;
-  };
-  events.refused = [this](const std::string& why) {
-    queue.command([this, why] { log.complain(config.monitor.clock_body, "live", why); });
-  };
-  reconfigure = std::make_unique<Reconfigure>(service, config, std::move(events));
+  map_subscriber =
+      input.subscribe<ShapeShifter>(config.liveMapName(), 2, [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
 }
 
 // --- start and stop --------------------------------------------------------------------------------------------------

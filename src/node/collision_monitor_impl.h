@@ -1,6 +1,6 @@
 // The node's inside. Callbacks of topics hand over to queues, services wait for the worker's answer, one thread asks
-// the master, and the worker alone touches the pipeline and publishes. collision_monitor.cpp holds all but the worker,
-// which is in monitor_worker.cpp.
+// the master, and the worker alone touches the pipeline and publishes. collision_monitor.cpp holds start, end and the
+// input thread, monitor_services.cpp the thread of services, monitor_worker.cpp the worker.
 #pragma once
 
 #include "output/outputs.h"
@@ -83,7 +83,6 @@ struct CollisionMonitor::Impl {
 
   // Input thread.
   void subscribe();
-  void guarded(const std::string& topic, const std::function<void()>& take);
   void onMesh(std::size_t body, MeshMessage message);
   void onTransforms(const tf2_msgs::TFMessage& message, bool is_static);
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
@@ -101,11 +100,9 @@ struct CollisionMonitor::Impl {
   void takeMaps();
   bool waitsForMap();
   bool mayTake(std::size_t body);
-  void takeMessages();
   bool holdsStaticFrames() const;
   void tellComplaints();
   void publishOutcome(Outcome& outcome);
-  void publishTopics(Outcome& outcome);
   void predict(Outcome& outcome);
   void publishPrediction(const Outcome& prediction);
   void publishEffects(const ros::Time& stamp);

@@ -16,6 +16,8 @@ class EffectTracker {
   /// `map_source`: the octomap's resolved topic or its file; empty: as the configuration calls it.
   explicit EffectTracker(const MonitorConfig& config, const std::string& map_source = {});
 
+  /// The octomap's resolved topic or its file.
+  const std::string& mapSource() const { return scene_.map_source; }
   /// False: the octomap is switched off, nothing is subscribed to for it.
   bool mayUseMap() const;
   bool mapExpected() const { return plan_.running(Effect::OCTOMAP); }

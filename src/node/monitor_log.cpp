@@ -6,7 +6,6 @@
 
 #include "input/short_text.h"
 #include "input/steady_clock.h"
-#include "output/advice.h"
 
 namespace dccd {
 
@@ -33,15 +32,10 @@ void MonitorLog::alarm(const std::string& kind, const std::string& text) {
 
 bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
-std::string MonitorLog::adviceOn(const Outcome& outcome) const {
-  return adviceFor(outcome.status, outcome.reason, mapSource());
-}
-
-void MonitorLog::tell(const Outcome& outcome) {
+void MonitorLog::tell(const Outcome& outcome, const std::string& remedy) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
-  const std::string advice = adviceOn(outcome);
   const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
-                           (advice.empty() ? "" : "; " + advice);
+                           (remedy.empty() ? "" : "; " + remedy);
   if (outcome.status != StepStatus::TIME_JUMP) {
     return complain(config_.monitor.clock_body, toString(outcome.status), text);
   }

@@ -26,10 +26,8 @@ class MonitorLog {
   void alarm(const std::string& kind, const std::string& text);
   /// Whether lines of this kind, which are not to be lost, may be written now.
   bool isDue(const std::string& kind);
-  /// What to do about an outcome that is not OK; empty: its reason says all.
-  std::string adviceOn(const Outcome& outcome) const;
   /// An outcome that is not OK: status, reason, and what to do.
-  void tell(const Outcome& outcome);
+  void tell(const Outcome& outcome, const std::string& remedy);
   /// Whether it is time to look into silence again: rarely, and not at once.
   bool isSilenceDue(std::int64_t now_ns);
   /// Logs a hint when it is another one than before. `silence`: why nothing comes, see silenceHint().

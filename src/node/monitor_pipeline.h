@@ -18,6 +18,7 @@
 #include "input/transforms.h"
 #include "node/attach_request.h"
 #include "node/effects.h"
+#include "output/statement.h"
 
 namespace dccd {
 
@@ -111,6 +112,8 @@ class MonitorPipeline {
   /// What the last outcome promises, and what became of the promise before; nothing where the configuration has no
   /// bounds.
   const PromiseWatch& promises() const { return promises_; }
+  /// What may be said of the last outcome.
+  const Statement& statement() const { return statement_; }
   /// How fast bodies are assumed to be, by body.
   std::vector<SpeedBound> speedBounds() const { return config_.speedBounds(monitor_->bodies().size()); }
   std::uint64_t transformsUnusable() const { return transforms_.unusable(); }
@@ -157,6 +160,7 @@ class MonitorPipeline {
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
   PromiseWatch promises_;
+  Statement statement_;
   std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;         // a static body of which the monitor has a frame
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
@@ -192,8 +196,6 @@ class MonitorPipeline {
   std::set<std::string> setsNamed(std::size_t body) const;
   /// The vertices of the sets that expected_contacts names. Throws ParameterError.
   void findSets();
-  /// Throws MeshError.
-  DecodedMesh decode(std::size_t body, const MeshMessage& message);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// What of the body's vertex_mask and of its expected contacts the mesh has not; empty: it has all.
   std::string indexProblem(std::size_t body, const Topology& topology) const;
@@ -223,10 +225,9 @@ class MonitorPipeline {
   std::size_t robotsVoxels(const Step& step);
   /// False: still waits.
   bool placeFrame(std::size_t body, std::int64_t now_ns);
-  /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
+  /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one. Once it is
+  /// overdue, links of a robot that have no transform stand in nobody's way any longer.
   bool placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
-  /// may_lose_links: those of a robot that have no transform stand in nobody's way any longer.
-  bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason);
   /// Where it is at the stamp, and was since another one. False: nobody knows.
   bool placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame, std::string& reason) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
@@ -247,8 +248,6 @@ class MonitorPipeline {
                                      StampNs to_ns) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.
   bool mapMayCome(std::int64_t now_ns) const;
-  /// Which transforms could not be used, to go after another reason.
-  std::string unusableTransforms() const;
 };
 
 }  // namespace dccd

@@ -6,17 +6,12 @@
 #include <sstream>
 #include <utility>
 
-#include "input/short_text.h"
 #include "input/transforms.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
 
 namespace {
-
-std::string noTransform(const std::string& from, const std::string& to, const std::string& why) {
-  return "no transform from '" + from + "' to '" + to + "': " + shortText(why);
-}
 
 SeenPose unknownAt(StampNs stamp_ns) {
   SeenPose seen{stamp_ns, {}};
@@ -32,11 +27,6 @@ ObstacleMap noMap(std::string why) {
 
 }  // namespace
 
-std::string MonitorPipeline::unusableTransforms() const {
-  const std::string unusable = transforms_.onlyUnusable();
-  return unusable.empty() ? "" : "; " + shortText(unusable);
-}
-
 bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame,
                                std::string& reason) const {
   frame = rigid.mesh;
@@ -46,8 +36,8 @@ bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs from_ns, StampNs stam
     // It stays where it was, and all of it is unknown there: unchecked.
     frame.pose = rigid.pose.value_or(Eigen::Isometry3d::Identity());
     frame.positions.assign(rigid.reference.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-    frame.seen = {unknownAt(stamp_ns - 1)};
-    reason = noTransform(rigid.frame, fixed_frame_, reason) + unusableTransforms() + "; body '" + rigid.name +
+    frame.seen.assign(1, unknownAt(stamp_ns - 1));
+    reason = transforms_.noTransform(rigid.frame, "'" + fixed_frame_ + "'", reason) + "; body '" + rigid.name +
              "' is carried by it";
     return false;
   }
@@ -73,7 +63,13 @@ void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::st
   monitor_->push(body, std::move(frame), now_ns);
 }
 
-bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason) {
+bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason) {
+  if (const std::size_t body = misplaced(); body < waiting_.size()) {
+    problem = StepStatus::NO_BODY;
+    reason = missing(body);
+    return false;
+  }
+  const StampNs stamp_ns = waiting_[config_.monitor.clock_body]->mesh.stamp_ns;
   struct Placed {
     std::size_t body;
     MeshFrame frame;
@@ -85,7 +81,7 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may
     if (!rigid_[b]) continue;
     Placed& one = all.emplace_back(Placed{b, {}, {}});
     if (!placeOne(*rigid_[b], clock_ns_, stamp_ns, one.frame, reason)) {
-      if (!may_lose_links || !rigid_[b]->may_be_lost) return false;
+      if (!overdue || !rigid_[b]->may_be_lost) return false;
       one.lost = reason;
     }
   }
@@ -140,16 +136,6 @@ std::size_t MonitorPipeline::misplaced() const {
   return b;
 }
 
-bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason) {
-  const std::size_t body = misplaced();
-  if (body == waiting_.size()) {
-    return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, overdue, reason);
-  }
-  problem = StepStatus::NO_BODY;
-  reason = missing(body);
-  return false;
-}
-
 /// Between two frames, h seconds apart, a vertex of at most the acceleration a goes within a h^2 / 8 of the straight
 /// way: along any direction its way from the straight one is 0 at both ends, and its second derivative is a at the
 /// most. Each frame carries this of the time before it, and a step takes the larger radius of the frames at its ends
@@ -186,7 +172,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   }
   const bool placed = has_place && (!is_clock || placeOthers(now_ns, overdue, problem, reason));
   if (!placed) {
-    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason) + unusableTransforms();
+    if (!has_place) reason = transforms_.noTransform(waiting.mesh.frame_id, "'" + fixed_frame_ + "'", reason);
     waiting.reason = reason;
     waiting.overdue = overdue;
     const bool timed_out =
@@ -253,8 +239,8 @@ bool MonitorPipeline::placeTrusted(std::int64_t now_ns) {
   if (trusted_placed_) {
     monitor_->setMapBeside(std::move(map));
   } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
-    monitor_->setMap(noMap("no transform from '" + fixed_frame_ + "' to the frame of octomap_file '" + map.frame_id +
-                           "': " + reason + unusableTransforms()));
+    monitor_->setMap(
+        noMap(transforms_.noTransform(fixed_frame_, "the frame of octomap_file '" + map.frame_id + "'", reason)));
   }
   return trusted_placed_;
 }
@@ -285,8 +271,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
     if (monitor_->map().problem.empty()) {
-      monitor_->setMap(noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame +
-                             "': " + reason + unusableTransforms()));
+      monitor_->setMap(noMap(transforms_.noTransform(fixed_frame_, "the octomap's frame '" + frame + "'", reason)));
     }
   }
 }

@@ -77,13 +77,6 @@ bool CollisionMonitor::Impl::waitsForMap() {
          queue.size(config.monitor.clock_body) < config.queue_size;
 }
 
-void CollisionMonitor::Impl::takeMessages() {
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    MeshMessage message;
-    if (mayTake(b) && queue.pop(b, message)) pipeline.take(b, message);
-  }
-}
-
 bool CollisionMonitor::Impl::mayTake(std::size_t body) {
   return pipeline.idle(body) && queue.size(body) > 0 && !(body == config.monitor.clock_body && waitsForMap());
 }
@@ -162,28 +155,16 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
 }
 
 /// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
-void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) {
-  try {
-    publishTopics(outcome);
-  } catch (const std::exception& error) {
-    ++steps_unpublished;
-    log.complain(config.monitor.clock_body, "publishing",
-                 std::string("not all of a step's results could be published: ") + error.what());
-    state.takeBack("not all of a step's results could be published");
-    carryOut([this] { outputs.publishNothing(pipeline.fixedFrame()); });
-  }
-}
-
-void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
+void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
-  log.tell(outcome);
+  log.tell(outcome, pipeline.statement().remedy);
   newest_ns = outcome.stamp_ns;
   // Before the contacts, though these then wait some 50 us longer for roscpp: a long list is not to keep a clear state
   // standing that is over.
   const std::vector<SpeedBound> bounds = pipeline.speedBounds();
-  state.tell(outcome, outcome.arrival_ns, frame, log.adviceOn(outcome), pipeline.promises().broken(), bounds);
+  state.tell(outcome, pipeline.statement(), frame, bounds);
   if (config.promises()) {
     outputs.publishSafeUntil(toSafeUntil(outcome, pipeline.promises(), bounds, ros::Time::now(), frame));
   }
@@ -201,6 +182,12 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
     outputs.publishStats(outcome, context, frame);
   }
   diagnostics.add(outcome, latency_s);
+} catch (const std::exception& error) {
+  ++steps_unpublished;
+  log.complain(config.monitor.clock_body, "publishing",
+               std::string("not all of a step's results could be published: ") + error.what());
+  state.takeBack("not all of a step's results could be published");
+  carryOut([this] { outputs.publishNothing(pipeline.fixedFrame()); });
 }
 
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
@@ -272,7 +259,10 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
   const std::uint64_t static_frames = state.staticFrames();  // before it: what comes from here on may not be taken
-  takeMessages();
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    MeshMessage message;
+    if (mayTake(b) && queue.pop(b, message)) pipeline.take(b, message);
+  }
   if (maps) maps->setFixedFrame(pipeline.fixedFrame());
   accountDropped();
   if (holdsStaticFrames()) state.staticInUse(static_frames);

@@ -10,8 +10,7 @@
 #include <std_msgs/Float64.h>
 
 #include "input/steady_clock.h"
-#include "output/output_messages.h"
-#include "output/patch_messages.h"
+#include "output/advice.h"
 
 namespace dccd {
 namespace {
@@ -93,20 +92,17 @@ void StateReporter::setHint(const std::string& hint) {
   if (std::exchange(hint_, hint) != hint) say(true);
 }
 
-void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame,
-                         const std::string& remedy, const std::string& broken, const std::vector<SpeedBound>& bounds) {
+void StateReporter::tell(const Outcome& outcome, const Statement& statement, const std::string& frame,
+                         const std::vector<SpeedBound>& bounds) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  answer_ = assuranceOf(outcome);
-  touches_ = touchesInWords(outcome);
-  remedy_ = remedy;
-  broken_ = broken;
+  answer_ = statement;
   if (law_) speed_told_ = toSpeedScale(outcome, bounds, *law_, frame);
   const ros::Time before = told_.holds_until;
   told_ = toState(outcome, frame);
   // What was answered last stays to be seen; that it is no more proved is said.
   if (!outcome.answered) told_.holds_until = before;
-  liveness_.outcome(arrival_ns, outcome.answered && outcome.obstacle && !told_.map_stamp.isZero() ? told_.map_age : -1,
-                    clock_.now());
+  const bool used_map = outcome.answered && outcome.obstacle && !told_.map_stamp.isZero();
+  liveness_.outcome(outcome.arrival_ns, used_map ? told_.map_age : -1, clock_.now());
   say(true);
 }
 
@@ -117,11 +113,8 @@ void StateReporter::asked(const std::string& what) {
 }
 
 void StateReporter::voidAnswer(const std::string& reason) {
-  answer_ = Assurance();
-  answer_.missing.push_back(reason);
-  touches_.clear();
-  remedy_.clear();
-  broken_.clear();
+  answer_ = Statement();
+  answer_.assurance.missing.push_back(reason);
   speed_told_ = deformable_ccd::SpeedScale();
   told_ = toState(Outcome(), std::move(told_.header.frame_id));
 }
@@ -176,17 +169,17 @@ void StateReporter::say(bool always) {
   const bool slowed = law_ && isSlowed(clock_.now());
   const bool as_slow = std::exchange(slowed_, slowed) == slowed;
   if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
-  Assurance assurance = answer_;
-  assurance.hinder(sentences);
+  Statement statement = answer_;
+  statement.assurance.hinder(sentences);
+  statement.remedy = joined(statement.remedy, hint_);
   deformable_ccd::State message = told_;
-  fillState(assurance, touches_, remedy_.empty() || hint_.empty() ? remedy_ + hint_ : remedy_ + "; " + hint_, message);
-  tellBroken(broken_, message);
+  fillState(statement, message);
   message.header.stamp = ros::Time::now();
   std_msgs::Bool clear;
-  clear.data = assurance.clear();
+  clear.data = message.clear;
   clear_.publish(clear);
   state_.publish(message);
-  if (law_) saySpeed(assurance);
+  if (law_) saySpeed(statement.assurance);
 }
 
 bool StateReporter::isSlowed(std::int64_t now_ns) const {

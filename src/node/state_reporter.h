@@ -14,9 +14,9 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 
-#include "dccd/assurance.h"
 #include "dccd/safe_until.h"
 #include "node/liveness.h"
+#include "output/output_messages.h"
 #include "output/safe_until_messages.h"
 
 namespace dccd {
@@ -55,10 +55,9 @@ class StateReporter {
   std::uint64_t staticFrames();
   /// So many of them are in use from the next step on.
   void staticInUse(std::uint64_t frames);
-  /// A step's answer, or why there is none and what to do about it. `broken`: PromiseWatch::broken(); `bounds`: for
-  /// ~speed_scale.
-  void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame, const std::string& remedy,
-            const std::string& broken = {}, const std::vector<SpeedBound>& bounds = {});
+  /// A step's answer, or why there is none. `bounds`: for ~speed_scale.
+  void tell(const Outcome& outcome, const Statement& statement, const std::string& frame,
+            const std::vector<SpeedBound>& bounds);
   /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
   void setHint(const std::string& hint);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.
@@ -86,9 +85,8 @@ class StateReporter {
   const std::optional<SpeedLaw> law_;
   WatchClock clock_;
   Liveness liveness_;
-  Assurance answer_;                       // of the last step or what came instead, without what is wrong besides
+  Statement answer_;                       // of the last step or what came instead, without what is wrong besides
   deformable_ccd::State told_;             // its other fields
-  std::string touches_, remedy_, broken_;  // of the last step
   deformable_ccd::SpeedScale speed_told_;  // of the last step
   bool slowed_ = false;                    // isSlowed() as it was said last
   std::string hint_;

@@ -167,4 +167,6 @@ std::string rigidHint(const std::string& file, const Positions& positions, doubl
   return sizeHint("rigid/mesh " + file, positions, mend.str());
 }
 
+std::string joined(const std::string& a, const std::string& b) { return a + (a.empty() || b.empty() ? "" : "; ") + b; }
+
 }  // namespace dccd

@@ -18,4 +18,7 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config);
 /// The same of a rigid body's mesh file: positions [m] after `scale`.
 std::string rigidHint(const std::string& file, const Positions& positions, double scale);
 
+/// Two clauses as one; either may be empty.
+std::string joined(const std::string& a, const std::string& b);
+
 }  // namespace dccd

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "dccd/contact_fields.h"
@@ -38,70 +37,6 @@ static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
 /// What is not there is NaN: plots leave it out, while an infinity takes their axes away.
 double plottable(double value) { return std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN(); }
-
-std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
-  static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
-  const auto& size = factsOf(contact.kind).vertices;
-  std::string text;
-  std::size_t next = 0;
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (side == 1) text += " and ";
-    if (size[side] == 0) return text + "the map";
-    text += SIZED[size[side]];
-    for (std::size_t i = 0; i < size[side]; ++i) text += (i ? "-" : "") + std::to_string(contact.vertex[next++]);
-    text += " of " + bodies.at(contact.body[side]).name;
-  }
-  return text;
-}
-
-/// What there is besides what is new.
-std::string besides(const Outcome& outcome) {
-  std::string text;
-  const std::size_t lasting = lastingPatches(outcome);
-  if (lasting > 0) text += std::to_string(lasting) + (lasting == 1 ? " patch lasts, " : " patches last, ");
-  if (outcome.counts.expected > 0) text += std::to_string(outcome.counts.expected) + " expected ones, ";
-  if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
-  return text;
-}
-
-/// "No contact" is said of clear steps alone; of others, what stands in the way of it.
-std::string noContact(const Outcome& outcome) {
-  const std::string start = std::string("starts ") + toString(outcome.start_state);
-  const Assurance assurance = assuranceOf(outcome);
-  if (assurance.clear()) return "no contact, " + start;
-  std::string text = outcome.tracked && assurance.proved ? "no new contact, " : "no contact found, but ";
-  if (outcome.status != StepStatus::OK) {
-    text += toString(outcome.status) + (outcome.reason.empty() ? "" : " (" + outcome.reason + ")") + ", ";
-  }
-  for (const std::string& sentence : outcome.unproved) {
-    if (sentence != outcome.reason) text += sentence + ", ";
-  }
-  return text + besides(outcome) + start;
-}
-
-/// Is the alarm about edges through faces, of which no contact tells?
-bool crossesAsNews(const Outcome& outcome) {
-  const auto crosses = [](const Patch& patch) { return patch.is_new && patch.crossings > 0; };
-  return outcome.tracked ? std::any_of(outcome.patches.begin(), outcome.patches.end(), crosses)
-                         : outcome.unchecked_toc_lower > 0;
-}
-
-/// A line for people; `first` is null where no contact is known.
-std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, const std::vector<Body>& bodies) {
-  if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
-  if (!std::isfinite(toc)) return noContact(outcome);
-  const std::string more = besides(outcome);
-  const std::string rest = (more.empty() ? ", " : ", besides " + more) + "starts " + toString(outcome.start_state);
-  char when[64];
-  std::snprintf(when, sizeof when, "%.6f s into the step", toc * outcome.duration_s());
-  if (!first && toc == 0 && crossesAsNews(outcome)) return "surfaces cross since before the step began" + rest;
-  if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + rest;
-  if (first->certainty != Certainty::CERTAIN) {
-    return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + rest;
-  }
-  return std::string(first->initial ? "in contact from the start" : "contact " + std::string(when)) + ": " +
-         nameOf(*first, bodies) + rest;
-}
 
 /// What most messages say first.
 template <class Message>
@@ -201,20 +136,6 @@ void resizeKept(std::vector<T>& list, std::size_t count) {
   if (list.capacity() > KEPT_FOR_USE * std::max(count, ALWAYS_KEPT)) list.shrink_to_fit();
 }
 
-void fillContacts(const Outcome& outcome, std::vector<ContactMessage>& out) {
-  resizeKept(out, outcome.contacts.size());
-  std::array<ContactGeometry, 256> geometry;  // of some at a time, which stay in the first cache
-  for (std::size_t first = 0, last = 0; first < out.size(); first = last) {
-    last = std::min(first + geometry.size(), out.size());
-    contactGeometries(outcome, first, last, geometry.data());
-    for (std::size_t i = first; i < last; ++i) {
-      const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
-      const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
-      fillContact(outcome, outcome.contacts[i], geometry[i - first], patch, out[i]);
-    }
-  }
-}
-
 }  // namespace
 
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
@@ -245,8 +166,8 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
   return out;
 }
 
-void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
-                      deformable_ccd::ContactArray& out) {
+const deformable_ccd::ContactArray& fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
+                                                     const std::string& frame, deformable_ccd::ContactArray& out) {
   fillHead(outcome, outcome.stamp_ns, frame, out);
   out.start = toRosTime(outcome.start_ns);
   out.reason = outcome.reason;
@@ -257,7 +178,17 @@ void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, c
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
   out.bodies.clear();
   for (const Body& body : bodies) out.bodies.push_back(body.name);
-  fillContacts(outcome, out.contacts);
+  resizeKept(out.contacts, outcome.contacts.size());
+  std::array<ContactGeometry, 256> geometry;  // of some at a time, which stay in the first cache
+  for (std::size_t first = 0, last = 0; first < out.contacts.size(); first = last) {
+    last = std::min(first + geometry.size(), out.contacts.size());
+    contactGeometries(outcome, first, last, geometry.data());
+    for (std::size_t i = first; i < last; ++i) {
+      const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
+      const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
+      fillContact(outcome, outcome.contacts[i], geometry[i - first], patch, out.contacts[i]);
+    }
+  }
   resizeKept(out.intersections, outcome.intersections.size());
   for (std::size_t i = 0; i < outcome.intersections.size(); ++i) {
     const StartIntersection& crossing = outcome.intersections[i];
@@ -266,6 +197,7 @@ void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, c
     put(crossing.vertex, message.vertex);
     message.expected = crossing.expected;
   }
+  return out;
 }
 
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
@@ -290,7 +222,7 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
     out.time_of_contact = toRosTime(outcome.stampBefore(toc));
     out.seconds_from_start = toc * outcome.duration_s();
   }
-  out.summary = summaryOf(outcome, toc, first, bodies);
+  out.summary = firstContactInWords(outcome, toc, first, bodies);
   return out;
 }
 
@@ -322,19 +254,20 @@ double mapAge(const Outcome& outcome) {
   return stamp_ns == 0 ? 0 : secondsBetween(stamp_ns, outcome.stamp_ns);
 }
 
-void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
-               deformable_ccd::State& message) {
+void fillState(const Statement& statement, deformable_ccd::State& message) {
+  const Assurance& assurance = statement.assurance;
   message.proved = assurance.proved;
   message.touching = static_cast<std::uint8_t>(assurance.touching);
   message.clear = assurance.clear();
-  message.reason = describe(assurance, touches);
-  if (!assurance.proved && !remedy.empty()) message.reason += "; " + remedy;
+  message.reason = describe(assurance, statement.touches);
+  if (!assurance.proved && !statement.remedy.empty()) message.reason += "; " + statement.remedy;
   // Where it was left out by choice, or is missing, that is said already.
   const bool is_news = assurance.proved && !message.checked_map && !message.holds_until.isZero();
   const auto tells = [](const std::string& sentence) { return sentence.find("octomap") != std::string::npos; };
   if (is_news && std::none_of(assurance.excluded.begin(), assurance.excluded.end(), tells)) {
     message.reason += "; nothing was checked against a map";
   }
+  if (!statement.broken.empty()) message.reason += "; the promise of ~safe_until was void: " + statement.broken;
   message.missing = assurance.missing;
   message.excluded = assurance.excluded;
   message.expected = assurance.expected;

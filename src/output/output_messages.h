@@ -13,9 +13,9 @@
 #include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
-#include "dccd/assurance.h"
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
+#include "output/statement.h"
 
 namespace dccd {
 
@@ -65,16 +65,14 @@ struct StatsContext {
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
-/// Fills the same into a message, which may have been another one before: its memory is used again.
-void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
-                      deformable_ccd::ContactArray& message);
+/// Fills the same into a message, which may have been another one before: its memory is used again. Returns it.
+const deformable_ccd::ContactArray& fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
+                                                     const std::string& frame, deformable_ccd::ContactArray& message);
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
 /// What was checked and when; what may be said of it comes by fillState().
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame);
-/// `touches`: touchesInWords(); `remedy`: what to do about what is not proved. Either may be empty.
-void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
-               deformable_ccd::State& message);
+void fillState(const Statement& statement, deformable_ccd::State& message);
 /// Of the map in use, at the step's end [s]; 0 where it carries no stamp, as one of a file.
 double mapAge(const Outcome& outcome);
 /// The message of the package, not StepStats.

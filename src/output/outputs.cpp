@@ -33,16 +33,9 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
-void Outputs::publishList(const ros::Publisher& topic, const Outcome& outcome, const std::vector<Body>& bodies,
-                          const std::string& frame) {
-  if (topic.getNumSubscribers() == 0) return;
-  fillContactArray(outcome, bodies, frame, list_);
-  topic.publish(list_);
-}
-
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
-  publishList(contacts_, outcome, bodies, frame);
+  if (contacts_.getNumSubscribers() > 0) contacts_.publish(fillContactArray(outcome, bodies, frame, list_));
   // Of a step from before somebody asked there are no distances.
   if (wantsDistances() && !(outcome.answered && outcome.clearances.empty())) {
     clearance_.publish(toClearanceArray(outcome, bodies, frame));
@@ -77,7 +70,7 @@ bool Outputs::wantsDistances() const { return clearance_.getNumSubscribers() > 0
 
 void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                 const MarkerConfig& markers, const std::string& frame) {
-  publishList(predicted_, prediction, bodies, frame);
+  if (predicted_.getNumSubscribers() > 0) predicted_.publish(fillContactArray(prediction, bodies, frame, list_));
   if (time_to_contact_.getNumSubscribers() > 0) {
     time_to_contact_.publish(toTimeToContact(prediction, horizon_s, bodies, frame));
   }

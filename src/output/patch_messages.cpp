@@ -124,38 +124,6 @@ std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, 
   return all;
 }
 
-std::string touchesInWords(const Outcome& outcome) {
-  struct Touch {
-    std::size_t patches = 0, expected = 0;
-    const Patch* largest = nullptr;
-    StampNs since_ns = UNKNOWN_NS;
-    bool since_start = false;
-  };
-  std::map<std::array<std::uint16_t, 2>, Touch> touches;
-  for (const Patch& patch : outcome.patches) {
-    Touch& touch = touches[patch.body];
-    ++touch.patches;
-    touch.expected += patch.isExpected();
-    if (!touch.largest || patch.contacts > touch.largest->contacts) touch.largest = &patch;
-    if (patch.beginning == PatchBeginning::INITIAL || patch.began_to_ns == UNKNOWN_NS) touch.since_start = true;
-    if (touch.since_ns == UNKNOWN_NS || patch.began_to_ns < touch.since_ns) touch.since_ns = patch.began_to_ns;
-  }
-  std::string text;
-  for (const auto& [body, touch] : touches) {
-    char words[120];
-    const double for_s = touch.since_ns == UNKNOWN_NS ? 0 : secondsBetween(touch.since_ns, outcome.stamp_ns);
-    std::snprintf(words, sizeof words, touch.since_start ? " since the first look" : " for %.2f s",
-                  std::max(0.0, for_s));
-    text += (text.empty() ? "" : ", ") + pairOf(body, outcome.step->bodies) + words;
-    const Vec3& at = touch.largest->centroid;
-    std::snprintf(words, sizeof words, ", %zu %s at %.3f %.3f %.3f", touch.patches,
-                  touch.patches == 1 ? "patch" : "patches, the largest", at.x(), at.y(), at.z());
-    text += words;
-    if (touch.expected == touch.patches) text += " (expected)";
-  }
-  return text;
-}
-
 std::size_t lastingPatches(const Outcome& outcome) {
   std::set<std::uint64_t> ids;
   for (const Patch& patch : outcome.patches) {

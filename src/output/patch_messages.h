@@ -22,9 +22,6 @@ std::vector<deformable_ccd::PatchEvent> toPatchEvents(const Outcome& outcome, co
                                                       const std::string& frame);
 /// The earliest new contact of each pair of partners.
 std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, const std::vector<Body>& bodies);
-/// Who touches whom, since when and where: "cloth and octomap for 2.07 s, 12 patches, the largest at 0.310 0.100
-/// 0.750". Empty where nothing touches, and without patches.
-std::string touchesInWords(const Outcome& outcome);
 /// Patches that touch and are not new.
 std::size_t lastingPatches(const Outcome& outcome);
 

@@ -102,8 +102,4 @@ void limitSpeed(const std::string& reason, deformable_ccd::SpeedScale& message) 
   message.reason = reason;
 }
 
-void tellBroken(const std::string& broken, deformable_ccd::State& message) {
-  if (!broken.empty()) message.reason += "; the promise of ~safe_until was void: " + broken;
-}
-
 }  // namespace dccd

@@ -6,7 +6,6 @@
 
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
-#include <deformable_ccd/State.h>
 
 #include "dccd/safe_until.h"
 
@@ -21,7 +20,5 @@ deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vecto
                                         const SpeedLaw& law, const std::string& frame);
 /// 0 for this reason.
 void limitSpeed(const std::string& reason, deformable_ccd::SpeedScale& message);
-/// Says in `reason` that the promise before this answer was void; an empty one changes nothing.
-void tellBroken(const std::string& broken, deformable_ccd::State& message);
 
 }  // namespace dccd

@@ -112,8 +112,6 @@ FrameCounters Monitor::total() const {
 
 StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns) {
   Impl& m = *impl_;
-  const StampNs stamp_ns = frame.stamp_ns;
-  const std::int64_t arrival_ns = frame.arrival_ns;
   m.finishing = false;
   if (!m.isStream(body)) {
     // In a store of its own, so that the newest push counts whatever its stamp: a static body's frame holds at all
@@ -129,63 +127,55 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
   }
   MeshStore& store = m.stores.at(body);
   const std::shared_ptr<const MeshFrame> before = store.empty() ? nullptr : store.newestShared();
+  Impl::Pending step;
+  step.stamp_ns = frame.stamp_ns;
+  step.arrival_ns = frame.arrival_ns;
   const StepStatus status = store.push(std::move(frame));
-  if (body == m.options.clock_body) {
-    const std::string reason = before ? seamReason(status, *before, store.newest(), m.options.store) : "";
-    Impl::Pending step = m.newPending(status, stamp_ns, arrival_ns, reason);
-    step.since_ns = now_ns;
-    m.onClockFrame(std::move(step));
-  } else {
+  if (body != m.options.clock_body) {
     m.counters[body].count(status);
+    return status;
   }
+  step.status = status;
+  step.since_ns = now_ns;
+  step.sequence = ++m.sequence;
+  if (before) step.reason = seamReason(status, *before, store.newest(), m.options.store);
+  if (status == StepStatus::OK) {
+    step.from = store.previous();
+    step.to = store.newestShared();
+  }
+  if (status == StepStatus::TIME_JUMP) m.jumpBackTo(step.stamp_ns);
+  const auto waits = [](const Impl::Pending& one) { return one.status == StepStatus::OK; };
+  const auto oldest = std::find_if(m.pending.begin(), m.pending.end(), waits);
+  if (m.pending.size() >= m.options.max_waiting && oldest != m.pending.end()) {
+    m.drop(*oldest, StepStatus::NO_BODY, "more than max_waiting steps wait for other bodies");
+  }
+  m.pending.push_back(std::move(step));
   return status;
 }
 
-Monitor::Impl::Pending Monitor::Impl::newPending(StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
-                                                 const std::string& reason) {
-  Pending step;
-  step.status = status;
-  step.stamp_ns = stamp_ns;
-  step.arrival_ns = arrival_ns;
-  step.sequence = ++sequence;
-  step.reason = reason;
-  return step;
-}
-
-void Monitor::Impl::onClockFrame(Pending step) {
-  const MeshStore& store = stores[options.clock_body];
-  if (step.status == StepStatus::OK) {
-    step.from = store.previous();
-    step.to = store.newestShared();
-  } else if (step.status == StepStatus::TIME_JUMP) {
-    // Steps that wait for other bodies will not get them any more, and those bodies' frames from before the jump, whose
-    // stamps lie after its new time, are of no use.
-    dropWaiting(StepStatus::NO_BODY, "time jumped back while waiting");
-    forgetHeldSeen();
-    for (std::size_t b = 0; b < stores.size(); ++b) {
-      const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
-                         secondsBetween(step.stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
-      if (stale) stores[b].clear();
-    }
+/// Steps that wait for other bodies will not get them any more, and those bodies' frames from before the jump, whose
+/// stamps lie after its new time, are of no use.
+void Monitor::Impl::jumpBackTo(StampNs stamp_ns) {
+  dropWaiting(StepStatus::NO_BODY, "time jumped back while waiting");
+  forgetHeldSeen();
+  for (std::size_t b = 0; b < stores.size(); ++b) {
+    const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
+                       secondsBetween(stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
+    if (stale) stores[b].clear();
   }
-  if (pending.size() >= options.max_waiting) {
-    for (Pending& waiting : pending) {
-      if (waiting.status != StepStatus::OK) continue;
-      drop(waiting, StepStatus::NO_BODY, "more than max_waiting steps wait for other bodies");
-      break;
-    }
-  }
-  pending.push_back(std::move(step));
 }
 
 void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason,
                    std::int64_t arrival_ns) {
   Impl& m = *impl_;
-  if (body == m.options.clock_body) {
-    m.pending.push_back(m.newPending(status, stamp_ns, arrival_ns, reason));
-  } else {
-    m.counters.at(body).count(status);
-  }
+  if (body != m.options.clock_body) return m.counters.at(body).count(status);
+  Impl::Pending step;
+  step.status = status;
+  step.stamp_ns = stamp_ns;
+  step.arrival_ns = arrival_ns;
+  step.sequence = ++m.sequence;
+  step.reason = reason;
+  m.pending.push_back(std::move(step));
 }
 
 void Monitor::setBody(std::size_t body, Body what) {
@@ -275,13 +265,10 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   last_runs = runs;
   outcome.stats[Effect::OWN_VOXELS].ms += own_voxels_ms;
   outcome.stats.total_ms += own_voxels_ms;
-  follow(outcome);
-  return outcome;
-}
-
-/// Which of its patches are those of the step before.
-void Monitor::Impl::follow(Outcome& outcome) {
-  if (!options.detector.patches) return tracker.seam();
+  if (!options.detector.patches) {
+    tracker.seam();
+    return outcome;
+  }
   const auto start = Deadline::Clock::now();
   try {
     tracker.expect(options.detector.expected);
@@ -293,16 +280,19 @@ void Monitor::Impl::follow(Outcome& outcome) {
   const double ms = msSince(start);
   outcome.stats[Effect::PATCHES].ms += ms;
   outcome.stats.total_ms += ms;
+  return outcome;
 }
 
 bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
   Impl& m = *impl_;
   if (m.pending.empty()) return false;
   Impl::Pending& step = m.pending.front();
-  if (step.status == StepStatus::OK) {
-    const bool timed_out = m.finishing || secondsBetween(step.since_ns, now_ns) >= m.options.sync_timeout_s;
-    if (m.ready(step, timed_out) == Impl::Ready::WAIT) return false;
+  const bool timed_out = m.finishing || secondsBetween(step.since_ns, now_ns) >= m.options.sync_timeout_s;
+  bool waits = false;
+  for (std::size_t b = 0; b < m.bodies.size() && step.status == StepStatus::OK; ++b) {
+    if (b != m.options.clock_body && m.waitsFor(b, step, timed_out)) waits = true;
   }
+  if (waits && step.status == StepStatus::OK) return false;
   const auto without = [&](StepStatus status, const std::string& reason) {
     outcome = Outcome{};
     outcome.status = status;

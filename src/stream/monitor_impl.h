@@ -30,7 +30,6 @@ struct Monitor::Impl {
     std::uint64_t sequence = 0;
     std::string reason;
   };
-  enum class Ready : std::uint8_t { YES, WAIT, NEVER };
   /// What the minimum separation measures neighbours in, one entry a body; frames are null where nothing is left out.
   struct References {
     std::vector<std::shared_ptr<const ReferenceFrame>> frames;
@@ -85,13 +84,11 @@ struct Monitor::Impl {
       if (step.status == StepStatus::OK) drop(step, status, reason);
     }
   }
-  /// With the next sequence number.
-  Pending newPending(StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
-  void onClockFrame(Pending step);
-  Ready ready(Pending& step, bool timed_out);
-  Ready placeable(std::size_t body, Pending& step, bool timed_out);
-  /// The body's run is another one than outcomes have told of: the step is one of seam, once.
-  bool isSeamOf(std::size_t body, Pending& step);
+  void jumpBackTo(StampNs stamp_ns);
+  /// Whether the body may still be where the step needs it. A step that it will never be there for is dropped.
+  bool waitsFor(std::size_t body, Pending& step, bool timed_out);
+  /// Where the body's run is another one than outcomes have told of, the step is one of seam, once.
+  void dropAtSeam(std::size_t body, Pending& step);
   Step place(const Pending& pending);
   void lookBetween(std::size_t body, Step& step) const;
   void lookAtHeld(Step& step) const;
@@ -110,8 +107,8 @@ struct Monitor::Impl {
   void settleDoubt(Step& step, const Deadline& deadline);
   StampNs wayNeededFrom(std::size_t body, StampNs stamp_ns) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;
+  /// With which of its patches are those of the step before.
   Outcome runStep(const Pending& pending, const Deadline& deadline);
-  void follow(Outcome& outcome);
 };
 
 }  // namespace dccd

@@ -90,53 +90,41 @@ void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::share
   body.dropped_faces = std::max(from->dropped_faces, to->dropped_faces);
 }
 
-Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, bool timed_out) {
+bool Monitor::Impl::waitsFor(std::size_t body, Pending& step, bool timed_out) {
   const MeshStore& store = stores[body];
   const auto name = [&] { return "body '" + bodies[body].name + "' "; };  // most of the time nobody asks
   if (!isStream(body)) {
-    if (!store.empty()) return Ready::YES;
-    if (!timed_out) return Ready::WAIT;
-    drop(step, StepStatus::NO_BODY, name() + "has not been received yet");
-    return Ready::NEVER;
+    if (store.empty() && timed_out) drop(step, StepStatus::NO_BODY, name() + "has not been received yet");
+    return store.empty() && !timed_out;
   }
   std::uint64_t run_t0 = 0;
   const Lookup at_t1 = store.lookup(step.to->stamp_ns, &runs[body]);
   if (at_t1 == Lookup::NOT_YET) {
-    if (!timed_out) return Ready::WAIT;
-    drop(step, StepStatus::NO_BODY,
-         name() + (store.empty() ? "has not been received yet" : "has no frame at or after the end of the step"));
-    return Ready::NEVER;
+    if (timed_out) {
+      drop(step, StepStatus::NO_BODY,
+           name() + (store.empty() ? "has not been received yet" : "has no frame at or after the end of the step"));
+    }
+    return !timed_out;
   }
   const Lookup at_t0 = store.lookup(step.from->stamp_ns, &run_t0);
   if (at_t1 == Lookup::READY && at_t0 == Lookup::READY && run_t0 == runs[body]) {
-    return isSeamOf(body, step) ? Ready::NEVER : Ready::YES;
+    dropAtSeam(body, step);
+    return false;
   }
   if (at_t1 == Lookup::READY) told_runs[body] = runs[body];
   drop(step, store.runReason() == StepStatus::FIRST_FRAME ? StepStatus::NO_BODY : store.runReason(),
        name() + "has no unbroken frames around the step (" + toString(store.runReason()) + ")");
-  return Ready::NEVER;
+  return false;
 }
 
 /// A run that began by a jump back may reach over the whole of a step that follows one of the run before: both alone
 /// are whole, and what happened between the two nobody saw.
-bool Monitor::Impl::isSeamOf(std::size_t body, Pending& step) {
+void Monitor::Impl::dropAtSeam(std::size_t body, Pending& step) {
   const bool was_told = told_runs[body] == 0 || told_runs[body] == runs[body];
   told_runs[body] = runs[body];
-  if (was_told) return false;
+  if (was_told) return;
   const StepStatus reason = stores[body].runReason();
   drop(step, reason, "body '" + bodies[body].name + "' began anew since the last step (" + toString(reason) + ")");
-  return true;
-}
-
-Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
-  Ready all = Ready::YES;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (b == options.clock_body) continue;
-    const Ready one = placeable(b, step, timed_out);
-    if (one == Ready::NEVER) return one;
-    if (one == Ready::WAIT) all = Ready::WAIT;
-  }
-  return all;
 }
 
 /// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the

@@ -133,9 +133,8 @@ class InterfaceTest(unittest.TestCase):
                     self.assertRegex(message, r'(?m)^(u?int|float)\d+ %s\b' % field)
 
     def test_services(self):
-        source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()
-        source = source[source.index('::advertiseServices('):]
-        code = set(re.findall(r'advertise(?:Service<[^>]*>)?\(\s*"(\w+)"', source))
+        source = (CHECKOUT / 'src/node/monitor_services.cpp').read_text()
+        code = set(re.findall(r'advertise<\w+>\(service, "(\w+)"', source))
         section = PAGE[PAGE.index('## Services'):PAGE.index('## Parameters')]
         self.assertGreaterEqual(len(code), 5)
         self.assertEqual(code, set(re.findall(r'(?:^|\. )`~(\w+)` \(', section, re.M)))

@@ -49,7 +49,7 @@ NUMBERS = {
         (r'\((\d+) if a distance is held', lambda: tolerance('CONTACTS_PER_FEATURE_WITH_DISTANCE')),
         (r'A leaf takes (\d+) bytes', lambda: tolerance('MAP_LEAF_SORTING') + 2 * tolerance('MAP_LEAF_IN_SURFACE')),
         (r'not all alike takes (\d+)\.', lambda: tolerance('MAP_NODE_BUILDING') + 2 * tolerance('MAP_NODE')),
-        (r'After (\d+) s the answer is', lambda: constant('src/node/collision_monitor.cpp', 'SERVICE_TIMEOUT_S')),
+        (r'After (\d+) s the answer is', lambda: constant('src/node/monitor_services.cpp', 'SERVICE_TIMEOUT_S')),
         (r'Files of version (\d+) are written and read', lambda: constant('src/record/step_recording.h', 'RECORDING_VERSION')),
         (r'of `exact`: (\d+) to \d+', lambda: constant('src/config/monitor_config.cpp', 'toc_bits', r'"%s", [^,]+, (\d+), \d+\)')),
         (r'of `exact`: \d+ to (\d+)', lambda: constant('src/config/monitor_config.cpp', 'toc_bits', r'"%s", [^,]+, \d+, (\d+)\)')),

@@ -9,7 +9,6 @@
 #include <std_msgs/Float64.h>
 
 #include "input/known_types.h"
-#include "output/advice.h"
 #include "output/clearance_messages.h"
 #include "output/markers.h"
 #include "output/safe_until_messages.h"
@@ -103,9 +102,7 @@ void ResultBag::addPatches(const Outcome& outcome, const MonitorPipeline& pipeli
 void ResultBag::addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
   deformable_ccd::State state = toState(outcome, pipeline.fixedFrame());
   state.header.stamp = at;
-  fillState(assuranceOf(outcome), touchesInWords(outcome), adviceFor(outcome.status, outcome.reason, map_source_),
-            state);
-  tellBroken(pipeline.promises().broken(), state);
+  fillState(pipeline.statement(), state);
   write("state", at, state);
   std_msgs::Bool clear;
   clear.data = state.clear;

@@ -48,7 +48,7 @@ void judge(const DecodedMesh& mesh) {
 
 bool feed(MeshDecoder& decoder, const std::string& type, const std::uint8_t* data, std::size_t size) {
   try {
-    judge(decoder.decode(type, data, size));
+    judge(decoder.decode(type, {data, size}));
     return true;
   } catch (const MeshError& error) {
     const std::string text = error.what();

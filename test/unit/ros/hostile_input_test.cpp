@@ -134,7 +134,7 @@ std::string refusalOf(const char* type, const std::uint8_t* data, std::size_t si
   MeshInputConfig config;
   // Without rows and columns a cloud would be refused for that alone.
   if (type == std::string("sensor_msgs/PointCloud2")) config.source = TopologySource::POLYLINE;
-  return refusal([&] { MeshDecoder(config).decode(type, data, size); });
+  return refusal([&] { MeshDecoder(config).decode(type, {data, size}); });
 }
 std::string refusalOf(const char* type, const Front& front) {
   return refusalOf(type, front.bytes().data(), front.bytes().size());

@@ -62,7 +62,7 @@ Bytes cloud() {
 }
 
 DecodedMesh decode(MeshDecoder& decoder, const char* type, const Bytes& bytes) {
-  return decoder.decode(type, bytes.data.data(), bytes.data.size());
+  return decoder.decode(type, {bytes.data.data(), bytes.data.size()});
 }
 std::string errorOf(MeshInputConfig config, const char* type, const Bytes& bytes) {
   MeshDecoder decoder(config);

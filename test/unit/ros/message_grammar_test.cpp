@@ -40,14 +40,14 @@ class MessageGrammar : public ::testing::Test {
     }
     const TypedMesh object{&type, boost::make_shared<Message>(message)};
     try {
-      const DecodedMesh mesh = decoder_->decode(type.datatype, bytes.data(), bytes.size());
-      const DecodedMesh same = of_objects_->decode(object);
+      const DecodedMesh mesh = decoder_->decode(type.datatype, {bytes.data(), bytes.size()});
+      const DecodedMesh same = of_objects_->decode(type.datatype, {}, object);
       EXPECT_EQ(0, std::memcmp(mesh.positions.data(), same.positions.data(), 24 * mesh.positions.size()));
       EXPECT_EQ(*mesh.topology, *same.topology);
       EXPECT_EQ(mesh.row_step_remark, same.row_step_remark);
       return mesh;
     } catch (const MeshError& error) {
-      EXPECT_EQ(error.what(), test::said<MeshError>([&] { of_objects_->decode(object); }));
+      EXPECT_EQ(error.what(), test::said<MeshError>([&] { of_objects_->decode(type.datatype, {}, object); }));
       throw;
     }
   }

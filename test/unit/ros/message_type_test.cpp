@@ -53,12 +53,12 @@ TEST(MessageType, AToyIsDecodedFromBytesAndAsAnObject) {
   const auto message = square();
   const std::vector<std::uint8_t> bytes = type.serialize(message.get());
   MeshDecoder decoder(gridInWorld());
-  const DecodedMesh from_bytes = decoder.decode(TOY_TYPE, bytes.data(), bytes.size());
-  const DecodedMesh from_object = decoder.decode(TypedMesh{&type, message});
+  const DecodedMesh from_bytes = decoder.decode(TOY_TYPE, {bytes.data(), bytes.size()});
+  const DecodedMesh from_object = decoder.decode(TOY_TYPE, {}, {&type, message});
   EXPECT_EQ(from_bytes.positions.at(3), Vec3(1, 1, 0.5));
   EXPECT_EQ(from_bytes.positions, from_object.positions);
   EXPECT_EQ(from_bytes.topology, from_object.topology);
-  EXPECT_THROW(decoder.decode(TOY_TYPE, bytes.data(), bytes.size() - 1), MeshError);
+  EXPECT_THROW(decoder.decode(TOY_TYPE, {bytes.data(), bytes.size() - 1}), MeshError);
 }
 
 TEST(MessageType, AToyIsNamedWhereverTypesAre) {

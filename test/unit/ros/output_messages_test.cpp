@@ -194,7 +194,7 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_EQ(toTimeToContact(alarm, 2, bodies, "world").seconds, 1);
 
   deformable_ccd::State state = toState(quiet, "world");
-  fillState(assuranceOf(quiet), "", "", state);
+  fillState(statementOf(quiet, "", ""), state);
   EXPECT_TRUE(state.proved);
   EXPECT_FALSE(state.clear);
   EXPECT_EQ(state.touching, deformable_ccd::State::EXPECTED);
@@ -211,12 +211,12 @@ TEST(State, ReasonIsEnoughByItself) {
   outcome.step = step;
   outcome.start_ns = 4900000000;
   outcome.stamp_ns = 5000000000;
-  const auto reasonOf = [&](const std::string& remedy) {
+  const auto reasonOf = [&](const std::string& broken) {
     deformable_ccd::State state = toState(outcome, "world");
-    fillState(assuranceOf(outcome), touchesInWords(outcome), remedy, state);
+    fillState(statementOf(outcome, "/octomap", broken), state);
     return state.reason;
   };
-  EXPECT_EQ(reasonOf("not asked for"), "proved, nothing touches; nothing was checked against a map");
+  EXPECT_EQ(reasonOf(""), "proved, nothing touches; nothing was checked against a map");
   Patch first, second;
   first.contacts = 2;
   first.began_to_ns = 2930000000;
@@ -233,9 +233,10 @@ TEST(State, ReasonIsEnoughByItself) {
   outcome.status = StepStatus::NO_MAP;
   outcome.unproved = {"no octomap has been received yet; checked without it"};
   EXPECT_EQ(
-      reasonOf("see rostopic hz /octomap"),
+      reasonOf("the map has new voxels"),
       "not proved: no octomap has been received yet; checked without it; what touches did so when the step began: "
-      "cloth and itself since the first look, 1 patch at 0.300 0.100 0.750; see rostopic hz /octomap");
+      "cloth and itself since the first look, 1 patch at 0.300 0.100 0.750; see rostopic hz /octomap, or do without "
+      "with effects/octomap: off; the promise of ~safe_until was void: the map has new voxels");
 }
 
 /// Bytes as they go over the wire.

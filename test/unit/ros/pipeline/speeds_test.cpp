@@ -212,15 +212,6 @@ TEST(SpeedScaleMessage, IsZeroForAReason) {
   EXPECT_TRUE(none.holds_until.isZero());
 }
 
-TEST(SafeUntilMessage, TheStateSaysThatAPromiseWasVoid) {
-  deformable_ccd::State state;
-  state.reason = "proved, nothing touches";
-  tellBroken("", state);
-  EXPECT_EQ(state.reason, "proved, nothing touches");
-  tellBroken("the map has new voxels", state);
-  EXPECT_EQ(state.reason, "proved, nothing touches; the promise of ~safe_until was void: the map has new voxels");
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd

@@ -1,0 +1,148 @@
+// The node's services: each asks the worker and waits for its reply.
+#include "node/collision_monitor_impl.h"
+
+#include <deformable_ccd/AttachObject.h>
+#include <deformable_ccd/DetachObject.h>
+#include <deformable_ccd/RemoveObject.h>
+#include <deformable_ccd/SetHold.h>
+#include <deformable_ccd/SetPhase.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+
+#include "input/short_text.h"
+
+namespace dccd {
+namespace {
+
+constexpr double SERVICE_TIMEOUT_S = 10;
+
+template <class Service>
+ros::ServiceServer advertise(ros::NodeHandle& node, const char* name,
+                             const std::function<Reply(const typename Service::Request&)>& answer) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  return node.advertiseService<Request, Response>(name, [answer](Request& request, Response& response) {
+    const Reply reply = answer(request);
+    response.success = reply.success;
+    response.message = reply.message;
+    return true;
+  });
+}
+
+}  // namespace
+
+void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
+  using std_srvs::SetBool;
+  using std_srvs::Trigger;
+  const auto ask = [this](const std::function<Reply()>& run) { return queue.call(run, SERVICE_TIMEOUT_S); };
+  services.push_back(advertise<Trigger>(service, "check_now", [this, ask](const Trigger::Request&) {
+    return ask([this] {
+      const Outcome outcome = pipeline.checkNow();
+      return Reply{outcome.answered, describe(outcome)};
+    });
+  }));
+  services.push_back(advertise<Trigger>(service, "record_step", [this, ask](const Trigger::Request&) {
+    return ask([this] {
+      Reply reply;
+      reply.success = recorder.record(reply.message);
+      return reply;
+    });
+  }));
+  services.push_back(advertise<Trigger>(service, "reset", [this, ask](const Trigger::Request&) {
+    state.asked("a reset was asked for");
+    return ask([this] {
+      resetNow(StepStatus::RESET);
+      return Reply{true, "frames forgotten; the next one is a first frame"};
+    });
+  }));
+  services.push_back(advertise<SetBool>(service, "enable", [this, ask](const SetBool::Request& request) {
+    enabled = request.data;
+    state.setEnabled(enabled);
+    state.asked("~enable was called");
+    return ask([this, on = request.data] {
+      resetNow(StepStatus::DISABLED);
+      return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
+    });
+  }));
+}
+
+/// What is expected, by the phase of the task and by what hands hold.
+void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
+  using deformable_ccd::SetHold;
+  using deformable_ccd::SetPhase;
+  const auto ask = [this](const std::function<void()>& set) {
+    const auto run = [this, set] {
+      try {
+        set();
+      } catch (const ParameterError& error) {
+        return Reply{false, error.what() + std::string("; in force is ") + pipeline.phaseInWords()};
+      }
+      return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
+    };
+    return queue.call(run, SERVICE_TIMEOUT_S);
+  };
+  services.push_back(advertise<SetPhase>(service, "set_phase", [this, ask](const SetPhase::Request& request) {
+    return ask([this, phase = request.phase] { pipeline.setPhase(phase); });
+  }));
+  services.push_back(advertise<SetHold>(service, "set_hold", [this, ask](const SetHold::Request& request) {
+    return ask([this, request] { pipeline.setHold(request.body, request.by, request.holds); });
+  }));
+}
+
+void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
+  using deformable_ccd::AttachObject;
+  using deformable_ccd::DetachObject;
+  using deformable_ccd::RemoveObject;
+  // What is refused is counted, be it on this thread, where meshes are read, or on the worker's.
+  const auto ask = [this](const std::string& done, const std::function<std::function<void()>()>& read) {
+    Reply reply;
+    try {
+      const std::function<void()> change = read();
+      reply = queue.call([change, done] { return change(), Reply{true, done}; }, SERVICE_TIMEOUT_S);
+    } catch (const std::exception& error) {
+      reply.message = error.what();
+    }
+    requests_refused += !reply.success;
+    reply.message = shortText(reply.message);
+    return reply;
+  };
+  services.push_back(advertise<AttachObject>(service, "attach", [this, ask](const AttachObject::Request& request) {
+    return ask("from the next step on '" + request.name + "' moves with " + request.link, [&] {
+      return [this, object = readAttach(request, config)] {
+        pipeline.attach(object);
+        state.takeBack("no step has been answered since '" + object.name + "' was attached");
+      };
+    });
+  }));
+  services.push_back(advertise<DetachObject>(service, "detach", [this, ask](const DetachObject::Request& request) {
+    return ask("from the next step on '" + request.name + "' stays where it is",
+               [&] { return [this, name = request.name] { pipeline.detach(name); }; });
+  }));
+  services.push_back(advertise<RemoveObject>(service, "remove", [this, ask](const RemoveObject::Request& request) {
+    return ask("'" + request.name + "' is forgotten",
+               [&] { return [this, name = request.name] { pipeline.remove(name); }; });
+  }));
+}
+
+void CollisionMonitor::Impl::listenToChanges(const ros::NodeHandle& service) {
+  Reconfigure::Events events;
+  events.change = [this](const Reconfigure::Change& change) -> std::string {
+    // Nobody knows what a worker will say that is busy for too long: then it is not to do it any more.
+    const auto is_wanted = std::make_shared<std::atomic<bool>>(true);
+    const auto run = [this, change, is_wanted] {
+      if (!*is_wanted) return Reply{};
+      pipeline.reconfigure(change);
+      state.setLimits(livenessLimits(config));
+      return Reply{true, ""};
+    };
+    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+    *is_wanted = false;
+    return reply.success ? "" : reply.message;
+  };
+  events.refused = [this](const std::string& why) {
+    queue.command([this, why] { log.complain(config.monitor.clock_body, "live", why); });
+  };
+  reconfigure = std::make_unique<Reconfigure>(service, config, std::move(events));
+}
+
+}  // namespace dccd

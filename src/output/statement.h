@@ -1,0 +1,26 @@
+// What people are told of an outcome, in sentences: made once, where it is concluded. Messages and the log carry them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dccd/assurance.h"
+#include "dccd/contact.h"
+
+namespace dccd {
+
+struct Statement {
+  Assurance assurance;
+  std::string touches;  ///< who touches whom, since when and where; empty where nothing does, and without patches
+  std::string remedy;   ///< what to do about what is not proved, see adviceFor(); may be empty
+  std::string broken;   ///< why the promise before this answer was void, see PromiseWatch::broken(); empty: it was not
+};
+
+/// `map_source`: the octomap's resolved topic or its file.
+Statement statementOf(const Outcome& outcome, const std::string& map_source, const std::string& broken);
+
+/// The line of ~first_contact; `first` is null where no contact is known.
+std::string firstContactInWords(const Outcome& outcome, double toc, const Contact* first,
+                                const std::vector<Body>& bodies);
+
+}  // namespace dccd
