@@ -8,6 +8,7 @@
 #include <ros/time.h>
 #include <std_msgs/Bool.h>
 #include <std_msgs/Float64.h>
+#include <boost/make_shared.hpp>
 
 #include "input/steady_clock.h"
 #include "output/output_messages.h"
@@ -178,12 +179,14 @@ void StateReporter::say(bool always) {
   if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
   Assurance assurance = answer_;
   assurance.hinder(sentences);
-  deformable_ccd::State message = told_;
-  fillState(assurance, touches_, remedy_.empty() || hint_.empty() ? remedy_ + hint_ : remedy_ + "; " + hint_, message);
-  tellBroken(broken_, message);
-  message.header.stamp = ros::Time::now();
-  std_msgs::Bool clear;
-  clear.data = assurance.clear();
+  // What is published as an object wakes roscpp's thread only where somebody listens: that thread takes locks, and
+  // perhaps the core, from the worker, which has yet to publish the contacts.
+  const auto message = boost::make_shared<deformable_ccd::State>(told_);
+  fillState(assurance, touches_, remedy_.empty() || hint_.empty() ? remedy_ + hint_ : remedy_ + "; " + hint_, *message);
+  tellBroken(broken_, *message);
+  message->header.stamp = ros::Time::now();
+  const auto clear = boost::make_shared<std_msgs::Bool>();
+  clear->data = assurance.clear();
   clear_.publish(clear);
   state_.publish(message);
   if (law_) saySpeed(assurance);
@@ -194,17 +197,17 @@ bool StateReporter::isSlowed(std::int64_t now_ns) const {
 }
 
 void StateReporter::saySpeed(const Assurance& assurance) {
-  deformable_ccd::SpeedScale message = speed_told_;
+  const auto message = boost::make_shared<deformable_ccd::SpeedScale>(speed_told_);
   if (!assurance.proved) {
-    limitSpeed("not proved: " + assurance.missing.front(), message);
+    limitSpeed("not proved: " + assurance.missing.front(), *message);
   } else if (slowed_) {
-    limitSpeed("no newer answer within the reaction time", message);
+    limitSpeed("no newer answer within the reaction time", *message);
   }
-  message.header.stamp = ros::Time::now();
-  message.header.frame_id = told_.header.frame_id;
+  message->header.stamp = ros::Time::now();
+  message->header.frame_id = told_.header.frame_id;
   speed_.publish(message);
-  std_msgs::Float64 value;
-  value.data = message.scale;
+  const auto value = boost::make_shared<std_msgs::Float64>();
+  value->data = message->scale;
   speed_value_.publish(value);
 }
 

@@ -45,13 +45,9 @@ class Outputs {
   void publishNothing(const std::string& frame);
 
  private:
-  /// Made only where somebody listens, in the memory of the one before.
-  void publishList(const ros::Publisher& topic, const Outcome& outcome, const std::vector<Body>& bodies,
-                   const std::string& frame);
-
   ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_,
       patches_, events_, clearance_, safe_until_;
-  deformable_ccd::ContactArray list_;
+  deformable_ccd::ContactArray list_;  // is made in the memory of the one before
   std::uint64_t markers_built_ = 0;
 };
 
