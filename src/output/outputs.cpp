@@ -35,9 +35,8 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
-void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
-  // All are made before the first is published, which wakes roscpp's thread: from then on each question for subscribers
-  // may wait for its locks.
+std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vector<Body>& bodies,
+                                          const std::string& frame) {
   std::optional<deformable_ccd::FirstContact> first;
   if (first_contact_.getNumSubscribers() > 0) first = toFirstContact(outcome, bodies, frame);
   const bool listed = contacts_.getNumSubscribers() > 0;
@@ -51,12 +50,14 @@ void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bod
   if (patches_.getNumSubscribers() > 0) patches = toPatchArray(outcome, bodies, frame);
   std::vector<deformable_ccd::PatchEvent> events;
   if (events_.getNumSubscribers() > 0) events = toPatchEvents(outcome, bodies, frame);
-
-  if (first) first_contact_.publish(*first);
-  if (listed) contacts_.publish(list_);
-  if (distances) clearance_.publish(*distances);
-  if (patches) patches_.publish(*patches);
-  for (const auto& event : events) events_.publish(event);
+  return [this, listed, first = std::move(first), distances = std::move(distances), patches = std::move(patches),
+          events = std::move(events)] {
+    if (first) first_contact_.publish(*first);
+    if (listed) contacts_.publish(list_);
+    if (distances) clearance_.publish(*distances);
+    if (patches) patches_.publish(*patches);
+    for (const auto& event : events) events_.publish(event);
+  };
 }
 
 void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
