@@ -306,13 +306,14 @@ bool MonitorConfig::holdsDistance() const {
 }
 
 std::uint64_t MonitorConfig::hash() const {
-  std::ostringstream text;
-  text << std::setprecision(17) << given_hash << ' ' << phase;
-  for (const Hold& hold : holds) text << ' ' << hold.closed;
-#define DCCD_HASH_SETTING(name, value) text << ' ' << static_cast<double>(value);
+  std::string bits = phase;  // no text of the numbers: this is asked for in each step
+  const auto add = [&](auto value) { bits.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  add(given_hash);
+  for (const Hold& hold : holds) add(hold.closed);
+#define DCCD_HASH_SETTING(name, value) add(static_cast<double>(value));
   DCCD_LIVE_SETTINGS(DCCD_HASH_SETTING)
 #undef DCCD_HASH_SETTING
-  return hashOf(text.str());
+  return hashOf(bits);
 }
 
 MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path, const RobotLoader& load) {

@@ -106,6 +106,7 @@ struct CollisionMonitor::Impl {
   void predict(Outcome& outcome);
   void publishPrediction(const Outcome& prediction);
   void publishEffects(const ros::Time& stamp);
+  void logEffects();
   void accountDropped();
   std::vector<AwaitedTopic> silentTopics();
   void lookIntoSilence();

@@ -17,7 +17,7 @@ constexpr std::int64_t PATIENCE_NS = 3000000000;
 }  // namespace
 
 MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config)
-    : node_(node), name_(name), config_(config) {}
+    : node_(node), name_(name), config_(config), map_source_(mapSourceOf(node, config)) {}
 
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
   const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();

@@ -40,12 +40,13 @@ class MonitorLog {
     const BodyConfig& one = config_.bodies[body];
     return one.link.empty() ? node_.resolveName(one.topic) : "body '" + one.body.name + "'";
   }
-  std::string mapSource() const { return mapSourceOf(node_, config_); }
+  const std::string& mapSource() const { return map_source_; }
 
  private:
   ros::NodeHandle node_;
   std::string name_;
   const MonitorConfig& config_;
+  std::string map_source_;
   LogThrottle throttle_{5};
   std::int64_t asked_ns_ = 0;
   std::string hint_, told_hint_;

@@ -8,6 +8,7 @@
 #include <ros/time.h>
 #include <std_msgs/Bool.h>
 #include <std_msgs/Float64.h>
+#include <boost/make_shared.hpp>
 
 #include "input/steady_clock.h"
 #include "output/advice.h"
@@ -172,11 +173,13 @@ void StateReporter::say(bool always) {
   Statement statement = answer_;
   statement.assurance.hinder(sentences);
   statement.remedy = joined(statement.remedy, hint_);
-  deformable_ccd::State message = told_;
-  fillState(statement, message);
-  message.header.stamp = ros::Time::now();
-  std_msgs::Bool clear;
-  clear.data = message.clear;
+  // What is published as an object wakes roscpp's thread only where somebody listens: that thread takes locks, and
+  // perhaps the core, from the worker, which has yet to publish the contacts.
+  const auto message = boost::make_shared<deformable_ccd::State>(told_);
+  fillState(statement, *message);
+  message->header.stamp = ros::Time::now();
+  const auto clear = boost::make_shared<std_msgs::Bool>();
+  clear->data = message->clear;
   clear_.publish(clear);
   state_.publish(message);
   if (law_) saySpeed(statement.assurance);
@@ -187,17 +190,17 @@ bool StateReporter::isSlowed(std::int64_t now_ns) const {
 }
 
 void StateReporter::saySpeed(const Assurance& assurance) {
-  deformable_ccd::SpeedScale message = speed_told_;
+  const auto message = boost::make_shared<deformable_ccd::SpeedScale>(speed_told_);
   if (!assurance.proved) {
-    limitSpeed("not proved: " + assurance.missing.front(), message);
+    limitSpeed("not proved: " + assurance.missing.front(), *message);
   } else if (slowed_) {
-    limitSpeed("no newer answer within the reaction time", message);
+    limitSpeed("no newer answer within the reaction time", *message);
   }
-  message.header.stamp = ros::Time::now();
-  message.header.frame_id = told_.header.frame_id;
+  message->header.stamp = ros::Time::now();
+  message->header.frame_id = told_.header.frame_id;
   speed_.publish(message);
-  std_msgs::Float64 value;
-  value.data = message.scale;
+  const auto value = boost::make_shared<std_msgs::Float64>();
+  value->data = message->scale;
   speed_value_.publish(value);
 }
 

@@ -1,5 +1,7 @@
 #include "output/outputs.h"
 
+#include <optional>
+
 #include "output/clearance_messages.h"
 #include "output/markers.h"
 #include "output/patch_messages.h"
@@ -33,17 +35,29 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
-void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
-  if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
-  if (contacts_.getNumSubscribers() > 0) contacts_.publish(fillContactArray(outcome, bodies, frame, list_));
+std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vector<Body>& bodies,
+                                          const std::string& frame) {
+  std::optional<deformable_ccd::FirstContact> first;
+  if (first_contact_.getNumSubscribers() > 0) first = toFirstContact(outcome, bodies, frame);
+  const bool listed = contacts_.getNumSubscribers() > 0;
+  if (listed) fillContactArray(outcome, bodies, frame, list_);
   // Of a step from before somebody asked there are no distances.
+  std::optional<deformable_ccd::ClearanceArray> distances;
   if (wantsDistances() && !(outcome.answered && outcome.clearances.empty())) {
-    clearance_.publish(toClearanceArray(outcome, bodies, frame));
+    distances = toClearanceArray(outcome, bodies, frame);
   }
-  if (patches_.getNumSubscribers() > 0) patches_.publish(toPatchArray(outcome, bodies, frame));
-  if (events_.getNumSubscribers() > 0) {
-    for (const auto& event : toPatchEvents(outcome, bodies, frame)) events_.publish(event);
-  }
+  std::optional<deformable_ccd::PatchArray> patches;
+  if (patches_.getNumSubscribers() > 0) patches = toPatchArray(outcome, bodies, frame);
+  std::vector<deformable_ccd::PatchEvent> events;
+  if (events_.getNumSubscribers() > 0) events = toPatchEvents(outcome, bodies, frame);
+  return [this, listed, first = std::move(first), distances = std::move(distances), patches = std::move(patches),
+          events = std::move(events)] {
+    if (first) first_contact_.publish(*first);
+    if (listed) contacts_.publish(list_);
+    if (distances) clearance_.publish(*distances);
+    if (patches) patches_.publish(*patches);
+    for (const auto& event : events) events_.publish(event);
+  };
 }
 
 void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,

@@ -4,6 +4,7 @@
 
 #include "output/output_messages.h"
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -21,8 +22,9 @@ class Outputs {
   /// Topics of effects that the configuration has no use for are not there.
   Outputs(ros::NodeHandle& private_node, const MonitorConfig& config);
 
-  /// What a robot waits for, before all that is only looked at: first contact, contacts, patches and their events.
-  void publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
+  /// What a robot waits for, before all that is only looked at: first contact, contacts, patches and their events. The
+  /// call of what is returned publishes them, once, before another list is made.
+  std::function<void()> makeResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
   void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
                       const std::string& frame);
   /// After the step's prediction, which it tells of.

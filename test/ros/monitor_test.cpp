@@ -3,6 +3,7 @@
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
 #include <deformable_ccd/TimeToContact.h>
 
@@ -100,6 +101,10 @@ TEST_F(Plain, ClearIsTrueOnlyForACheckedStep) {
   const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(tipAbove(0.9), 10.1));
   EXPECT_EQ(outcome.start_state, deformable_ccd::ContactArray::CLEAR);
   EXPECT_TRUE(waitUntil([&] { return clear.last().data; }));
+  const ros::Time asked = ros::Time::now();
+  const deformable_ccd::State state = Probe<deformable_ccd::State>(node, "/plain/state").after(0);
+  EXPECT_EQ(state.holds_until, ros::Time(10.1));
+  EXPECT_LT(state.header.stamp, asked) << "it was said when nobody listened";
   EXPECT_TRUE(trigger("reset").success);
   EXPECT_TRUE(waitUntil([&] { return !clear.last().data; })) << "a reset is not clear";
 }
