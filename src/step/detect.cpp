@@ -147,7 +147,6 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (options->patches) findPatches(outcome);
   sayLeftOutForNoise(step, outcome.unproved);
   conclude(*options, step, needed, outcome);
-  if (options->patches) patches.list(outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
     const double others_ms =
@@ -165,7 +164,7 @@ void History::Impl::findPatches(Outcome& outcome) {
   patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);
   StageStats& stats = outcome.stats[Effect::PATCHES];
   patches_took = Clock::now() - start;
-  stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
+  stats = {patches.touchCount(), outcome.patches.size(), msSince(start)};
 }
 
 /// How far apart things are in a part, after its contacts: of a budget too small for both these come first.

@@ -126,11 +126,11 @@ void PatchTracker::takeBodies(const std::vector<Body>& bodies) {
   }
   if (same) return;
   graph_.setBodies(bodies);
-  for (Touch& spot : trace_.spots) {
-    for (std::size_t side = 0; side < 2 && spot.point[side] != NO_INDEX; ++side) {
-      const auto next = std::upper_bound(begin.begin(), begin.end(), spot.point[side]);
+  for (TouchGraph::Spot& spot : trace_.spots) {
+    for (std::size_t side = 0; side < 2 && spot.vertex[side] != NO_INDEX; ++side) {
+      const auto next = std::upper_bound(begin.begin(), begin.end(), spot.vertex[side]);
       const auto body = static_cast<std::size_t>(next - begin.begin()) - 1;
-      spot.point[side] += graph_.firstVertex(body) - begin[body];
+      spot.vertex[side] += graph_.firstVertex(body) - begin[body];
     }
   }
 }
@@ -221,8 +221,8 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
   before_.clear();
   if (std::exchange(half_merged_, true)) last_at_.clear();
   last_at_.resize(graph_.vertexCount(), NO_INDEX);
-  const auto add = [&](const Touch& spot, const Known& known) {
-    std::uint32_t& last = last_at_[spot.point[0]];
+  const auto add = [&](const TouchGraph::Spot& spot, const Known& known) {
+    std::uint32_t& last = last_at_[spot.vertex[0]];
     before_.push_back(last);
     last = static_cast<std::uint32_t>(all_.spots.size());
     all_.push(spot, known);
@@ -235,21 +235,16 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
   current_.assign(all_.spots.size(), NO_PATCH);
   for (const PatchSpot& spot : spots) {
     std::uint32_t at = last_at_[spot.vertex];
-    while (at != NO_INDEX && all_.spots[at].point[1] != spot.across) at = before_[at];
+    while (at != NO_INDEX && all_.spots[at].vertex[1] != spot.across) at = before_[at];
     if (at == NO_INDEX) {
-      Touch touch;
-      touch.body = outcome.patches[spot.patch].body;
-      touch.kind = touch.onMap() ? static_cast<std::uint8_t>(PairKind::VERTEX_VOXEL_FACE) : Touch::VERTICES;
-      touch.point[0] = spot.vertex;
-      touch.point[1] = spot.across;
       at = static_cast<std::uint32_t>(all_.spots.size());
-      add(touch, Known());
+      add({{spot.vertex, spot.across}, outcome.patches[spot.patch].body}, Known());
       current_.push_back(NO_PATCH);
     }
     all_.spots[at].expected = spot.expected;
     current_[at] = spot.patch;
   }
-  for (const Touch& spot : all_.spots) last_at_[spot.point[0]] = NO_INDEX;
+  for (const TouchGraph::Spot& spot : all_.spots) last_at_[spot.vertex[0]] = NO_INDEX;
   half_merged_ = false;
 }
 
@@ -257,35 +252,44 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
 /// Asked only where the map is another one than in the step before.
 void PatchTracker::findNewVoxels(const PatchMaker& found, const Outcome& outcome) {
   if (last_map_ != outcome.obstacle && has_last_) {
-    for (std::size_t t = 0; t < found.touches().size(); ++t) {
-      const Touch& touch = found.touches()[t];
-      Part& part = parts_[part_of_patch_[found.patchOf()[t]]];
-      if (part.map_changed || !part.before.empty() || !touch.initial || !touch.onMap()) continue;
-      part.map_changed = isNewOnMap(touch, outcome);
+    for (const PatchLeaf& leaf : found.leaves()) {
+      Part& part = parts_[part_of_patch_[leaf.patch]];
+      if (part.map_changed || !part.before.empty() || !leaf.initial) continue;
+      part.map_changed = isNewOnMap(leaf, outcome);
     }
   }
   last_map_ = outcome.obstacle;
   last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
-bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
+bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) const {
   if (!last_map_) return true;
-  const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, touch.level);
-  const VoxelKey key = touch.voxel();
-  const Vec3 center(voxelPlane(key.x, resolution_m) + half, voxelPlane(key.y, resolution_m) + half,
-                    voxelPlane(key.z, resolution_m) + half);
+  const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, leaf.level);
+  const Vec3 center(voxelPlane(leaf.voxel.x, resolution_m) + half, voxelPlane(leaf.voxel.y, resolution_m) + half,
+                    voxelPlane(leaf.voxel.z, resolution_m) + half);
   return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
 }
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
   // Where all that touched still does, the patches of the step are the parts.
   const bool same = all_.spots.size() == found.spots().size();
-  part_of_ = same ? &current_ : &graph_.components(all_.spots);
+  releaseBurst(part_of_);
+  if (same) {
+    part_of_ = current_;
+  } else {
+    graph_.clear();
+    graph_.add(all_.spots.data(), all_.spots.data() + all_.spots.size());
+    graph_.findPatches();
+    part_of_.clear();
+    graph_.forEach([&](const TouchGroup&, std::uint32_t first, std::uint32_t last, std::uint32_t part) {
+      part_of_.insert(part_of_.end(), last - first, part);
+    });
+  }
   releaseBurst(parts_);
-  parts_.assign(same ? outcome.patches.size() : graph_.componentCount(), Part());
+  parts_.assign(same ? outcome.patches.size() : graph_.patchCount(), Part());
   part_of_patch_.assign(outcome.patches.size(), 0);
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    const std::uint32_t part = (*part_of_)[i];
+    const std::uint32_t part = part_of_[i];
     const std::uint64_t id = all_.known[i].id;
     std::vector<std::uint64_t>& before = parts_[part].before;
     if (id != 0 && (before.empty() || before.back() != id)) before.push_back(id);
@@ -382,12 +386,12 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   alive_.clear();
   for (auto& [id, living] : living_) living.unexpected = false;
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    Touch& spot = all_.spots[i];
+    TouchGraph::Spot& spot = all_.spots[i];
     Known known = all_.known[i];
-    const std::int64_t clock_ns = spot.onMap() ? map_clock_ns_ : mesh_clock_ns_;
+    const std::int64_t clock_ns = spot.body[1] == OBSTACLE_BODY ? map_clock_ns_ : mesh_clock_ns_;
     if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
     if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) continue;
-    Part& part = parts_[(*part_of_)[i]];
+    Part& part = parts_[part_of_[i]];
     if (part.touches) {
       known.id = part.id;
       // All of it is expected now: what was not, when other things were expected, is over.
