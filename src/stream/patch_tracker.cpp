@@ -20,11 +20,11 @@ bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
 
 }  // namespace
 
-void PatchTracker::Trace::clear() {
+void PatchTracker::Trace::resize(std::size_t size) {
+  spots.resize(size);
+  known.resize(size);
   releaseBurst(spots);
   releaseBurst(known);
-  spots.clear();
-  known.clear();
 }
 
 PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
@@ -51,12 +51,12 @@ void PatchTracker::seam(std::size_t body) {
     at = living_.erase(at);
   }
   if (body == ALL) {
-    trace_.clear();
+    trace_.resize(0);
     has_last_ = false;
     return;
   }
   std::swap(trace_, all_);
-  trace_.clear();
+  trace_.resize(0);
   for (std::size_t i = 0; i < all_.spots.size(); ++i) {
     if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
   }
@@ -90,6 +90,7 @@ void PatchTracker::tell(Outcome& outcome) {
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
   takeBodies(outcome.step->bodies);
+  std::swap(all_, trace_);
   merge(found.spots(), outcome);
   findParts(found, outcome);
   findNewVoxels(found, outcome);
@@ -141,6 +142,8 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
+  all_.resize(0);
+  all_ = trace_;
   merge(found.spots(), outcome);
   findParts(found, outcome);
   findNews();
@@ -214,23 +217,19 @@ void PatchTracker::goOn(const Outcome& outcome) {
   if (map_seen_) map_clock_ns_ += duration_ns;
 }
 
-/// Joins the trace and what touches in this step into all_, each pair of vertices once.
+/// Adds what touches in this step to the trace, which all_ is before, each pair of vertices once.
 void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& outcome) {
-  all_.clear();
-  releaseBurst(before_);
-  before_.clear();
-  if (std::exchange(half_merged_, true)) last_at_.clear();
-  last_at_.resize(graph_.vertexCount(), NO_INDEX);
-  const auto add = [&](const TouchGraph::Spot& spot, const Known& known) {
-    std::uint32_t& last = last_at_[spot.vertex[0]];
-    before_.push_back(last);
-    last = static_cast<std::uint32_t>(all_.spots.size());
-    all_.push(spot, known);
-  };
   // After a burst of contacts the trace would cost every later step as much, so it is forgotten early.
   const std::size_t kept = std::max(tolerance::TRACE_PER_SPOT * spots.size(), tolerance::TRACE_ALWAYS);
-  forgot_burst_ = trace_.spots.size() > kept;
-  for (std::size_t i = 0; !forgot_burst_ && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
+  forgot_burst_ = all_.spots.size() > kept;
+  if (forgot_burst_) all_.resize(0);
+  releaseBurst(before_);
+  before_.resize(all_.spots.size());
+  if (std::exchange(half_merged_, true)) last_at_.clear();
+  last_at_.resize(graph_.vertexCount(), NO_INDEX);
+  for (std::uint32_t i = 0; i < before_.size(); ++i) {
+    before_[i] = std::exchange(last_at_[all_.spots[i].vertex[0]], i);
+  }
   releaseBurst(current_);
   current_.assign(all_.spots.size(), NO_PATCH);
   for (const PatchSpot& spot : spots) {
@@ -238,7 +237,8 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
     while (at != NO_INDEX && all_.spots[at].vertex[1] != spot.across) at = before_[at];
     if (at == NO_INDEX) {
       at = static_cast<std::uint32_t>(all_.spots.size());
-      add({{spot.vertex, spot.across}, outcome.patches[spot.patch].body}, Known());
+      all_.push({{spot.vertex, spot.across}, outcome.patches[spot.patch].body}, Known());
+      before_.push_back(std::exchange(last_at_[spot.vertex], at));
       current_.push_back(NO_PATCH);
     }
     all_.spots[at].expected = spot.expected;
@@ -382,12 +382,12 @@ void PatchTracker::begin(Outcome& outcome) {
 
 /// The step becomes the trace, without what has not touched for longer than the gap.
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
-  trace_.clear();
   alive_.clear();
   for (auto& [id, living] : living_) living.unexpected = false;
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < current_.size(); ++i) {
     TouchGraph::Spot& spot = all_.spots[i];
-    Known known = all_.known[i];
+    Known& known = all_.known[i];
     const std::int64_t clock_ns = spot.body[1] == OBSTACLE_BODY ? map_clock_ns_ : mesh_clock_ns_;
     if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
     if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) continue;
@@ -401,8 +401,11 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
       if (alive_.empty() || alive_.back() != known.id) alive_.push_back(known.id);
       if (!spot.expected) living_.at(known.id).unexpected = true;
     }
-    trace_.push(spot, known);
+    all_.spots[kept] = spot;
+    all_.known[kept++] = known;
   }
+  all_.resize(kept);
+  std::swap(all_, trace_);
   for (auto& [id, living] : living_) {
     const bool seen = living.body[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
     if (seen && living.released_ns == UNKNOWN_NS) living.released_ns = outcome.start_ns;

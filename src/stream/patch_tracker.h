@@ -52,7 +52,7 @@ class PatchTracker {
   struct Trace {
     std::vector<TouchGraph::Spot> spots;
     std::vector<Known> known;
-    void clear();
+    void resize(std::size_t size);
     void push(const TouchGraph::Spot& spot, const Known& is) {
       spots.push_back(spot);
       known.push_back(is);

@@ -22,6 +22,16 @@ Vec3 throughPlane(const Vec3& p, const Vec3& q, const Vec3& corner, const Vec3& 
   return std::isfinite(share) ? Vec3(p + std::clamp(share, 0.0, 1.0) * (q - p)) : Vec3(0.5 * (p + q));
 }
 
+/// Of two features of meshes, as lanes have it.
+Vec3 normalOf(const Outcome& outcome, const Contact& contact) {
+  if (outcome.substeps > 1) return contactGeometry(outcome, contact).normal;
+  const auto at = [&](int i) { return (*outcome.step->bodies[contact.bodyOf(i)].t0)[contact.vertex[i]]; };
+  const Vec3 v0 = at(0), v1 = at(1), v2 = at(2), v3 = at(3);
+  const bool edges = contact.kind == PairKind::EDGE_EDGE;
+  const Vec3 normal = unitOr(edges ? (v1 - v0).cross(v3 - v2) : (v2 - v1).cross(v3 - v1), Vec3::Zero());
+  return normal.dot(v0 - (edges ? v2 : v1)) < 0 ? Vec3(-normal) : normal;
+}
+
 /// Ties stay in the canonical order.
 bool isEarlier(const Contact& a, const Contact& b) {
   return a.expected != b.expected ? b.expected : a.toc_lower < b.toc_lower;
@@ -79,14 +89,7 @@ PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, const Contact& con
     const ContactGeometry geometry = contactGeometry(outcome, contact);
     return {geometry.point, geometry.normal};
   }
-  if (contact.body[1] == OBSTACLE_BODY) return placeOnMap(outcome, contact);
-  Place place;
-  const auto use = [&](std::size_t, const simd::TouchBlock& block, std::size_t lane) {
-    place = {laneOf(block.point, lane), laneOf(block.normal, lane)};
-  };
-  const auto c = static_cast<std::size_t>(&contact - outcome.contacts.data());
-  inLanes<true>(outcome, c, c + 1, simd::touchPlaces, use, [](std::size_t) {});
-  return place;
+  return placeOnMap(outcome, contact);
 }
 
 /// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.
@@ -126,7 +129,8 @@ inline void PatchMaker::addContact(const Outcome& outcome, std::size_t c, const 
   const bool self = contact.body[0] == contact.body[1];
   if (part.contacts == 0) {
     part.earliest = static_cast<std::uint32_t>(c);
-    if (self) part.first_normal = placeOf(outcome, outcome.contacts[first_of_[part.patch]]).normal;
+    const std::size_t first = first_of_[part.patch];
+    if (self) part.first_normal = first == c ? normal : normalOf(outcome, outcome.contacts[first]);
   }
   part.expected += contact.expected;
   if (!contact.expected) (contact.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;

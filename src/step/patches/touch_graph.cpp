@@ -1,6 +1,7 @@
 #include "step/patches/touch_graph.h"
 
 #include <algorithm>
+#include <cstring>
 #include <tuple>
 #include <type_traits>
 
@@ -114,9 +115,17 @@ void TouchGraph::findAreas(std::size_t first, std::size_t last) {
 }
 
 void TouchGraph::findAreasOf(std::size_t body) {
-  const Index begin = vertex_begin_[body], end = vertex_begin_[body + 1];
-  for (Index vertex = begin; vertex < end; ++vertex) {
-    if (!is_touched_[vertex]) continue;
+  const auto forEachTouched = [this, begin = vertex_begin_[body], end = vertex_begin_[body + 1]](const auto& f) {
+    for (Index vertex = begin; vertex < end; ++vertex) {
+      if (!is_touched_[vertex]) {  // most are not
+        const void* const next = std::memchr(is_touched_.data() + vertex, true, end - vertex);
+        if (!next) return;
+        vertex = static_cast<Index>(static_cast<const std::uint8_t*>(next) - is_touched_.data());
+      }
+      f(vertex);
+    }
+  };
+  forEachTouched([&](Index vertex) {
     Index root = area_[vertex] = vertex;
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
@@ -125,12 +134,11 @@ void TouchGraph::findAreasOf(std::size_t body) {
       area_[std::max(root, other_root)] = std::min(root, other_root);
       root = std::min(root, other_root);
     }
-  }
-  for (Index vertex = begin; vertex < end; ++vertex) {
-    if (!is_touched_[vertex]) continue;
+  });
+  forEachTouched([&](Index vertex) {
     area_[vertex] = area_[area_[vertex]];  // no vertex is before the first one of its area
     is_touched_[vertex] = false;
-  }
+  });
 }
 
 /// Touches between the same two areas are one component.
