@@ -222,7 +222,7 @@ void PatchMaker::findVertexAreas(const Step& step) {
     const std::uint32_t* const seen = seen_patch_.data() + base;
     for (const Face& face : step.bodies[b].topology->faces()) {
       if ((seen[face[0]] & seen[face[1]] & seen[face[2]]) == NO_PATCH) continue;  // none of them touches anything
-      const double third = (1.0 / 6) * (x[face[1]] - x[face[0]]).cross(x[face[2]] - x[face[0]]).norm();
+      const double third = (x[face[1]] - x[face[0]]).cross(x[face[2]] - x[face[0]]).norm() / 6;
       if (!std::isfinite(third)) continue;
       for (const Index v : face) vertex_area_[base + v] += third;
     }
@@ -241,6 +241,7 @@ void PatchMaker::findAreas(const Outcome& outcome) {
   }
 }
 
+/// Patch by patch: of a vertex only the last patch that had it needs to be known.
 void PatchMaker::findSpots() {
   by_patch_.resize(stretches_.size());
   std::vector<std::uint32_t> ends(graph_.patchCount() + 1, 0);

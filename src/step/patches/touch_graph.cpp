@@ -38,6 +38,8 @@ void TouchGraph::setBodies(const std::vector<Body>& bodies) {
 
 namespace {
 
+constexpr std::ptrdiff_t AHEAD = 32;  // touches that are fetched from memory
+
 std::array<std::uint8_t, 2> sizesOf(const Contact& contact) { return factsOf(contact.kind).vertices; }
 std::array<std::uint8_t, 2> sizesOf(const StartIntersection&) { return {2, 3}; }
 std::array<std::uint8_t, 2> sizesOf(const TouchGraph::Spot& spot) {
@@ -51,11 +53,10 @@ bool isAlike(const T& a, const T& b) {
 
 }  // namespace
 
-constexpr std::ptrdiff_t AHEAD = 32;  // touches that are fetched from memory
 template <class T>
 void TouchGraph::add(const T* first, const T* last) {
   constexpr std::size_t MOST = std::tuple_size_v<decltype(T::vertex)>;
-  const bool numbered_on = std::is_same_v<T, Spot>;
+  constexpr bool NUMBERED_ON = std::is_same_v<T, Spot>;
   const auto count = static_cast<std::size_t>(last - first);
   std::size_t used = vertices_used_;
   if (vertices_.size() < used + MOST * count) vertices_.resize(used + MOST * count);
@@ -64,13 +65,13 @@ void TouchGraph::add(const T* first, const T* last) {
     const T& head = *at;
     TouchGroup group{head.body, sizesOf(head), touch_count_, 0, used};
     std::array<Index, MOST> base{};
-    for (std::size_t i = 0; !numbered_on && i < static_cast<std::size_t>(group.size()); ++i) {
+    for (std::size_t i = 0; !NUMBERED_ON && i < static_cast<std::size_t>(group.size()); ++i) {
       base[i] = vertex_begin_[head.body[i >= group.sizes[0]]];
     }
     do {
       __builtin_prefetch(at + std::min<std::ptrdiff_t>(AHEAD, last - at));
-      for (std::size_t i = 0; i < MOST; ++i)
-        vertices_[used + i] = base[i] + at->vertex[i];  // more than there are: fast
+      // All that there may be, which takes no branch; the next touch overwrites what is too many.
+      for (std::size_t i = 0; i < MOST; ++i) vertices_[used + i] = base[i] + at->vertex[i];
       used += static_cast<std::size_t>(group.size());
       expected_[touch_count_++] = at->expected;
       ++at;

@@ -11,12 +11,12 @@
 
 namespace dccd {
 
+constexpr std::size_t CONTACTS_AHEAD = 16;  ///< whose vertices are fetched from memory
+
 /// Of outcome.contacts from first to last, in their order: kernel(edge_edge, count, block) takes a block of lanes, then
 /// use(contact, block, lane) each of them; other(contact) those with the map and, where the step is cut into parts,
 /// all. contact: its place in the list. PLACES: the kernel is simd::touchPlaces, which is spared the ends that it does
 /// not use.
-constexpr std::size_t AHEAD = 16;  // contacts whose vertices are fetched from memory
-
 template <bool PLACES, class Kernel, class Use, class Other>
 void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const Kernel& kernel, const Use& use,
              const Other& other) {
@@ -58,8 +58,8 @@ void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const 
       std::size_t count = 0;
       const std::size_t most = std::min(simd::TOUCHES, last - c);
       while (count < most && contacts[count].kind == contacts->kind) {
-        __builtin_prefetch(contacts + std::min(count + 4 * AHEAD, last - c));
-        take(contacts[count], contacts[std::min(count + AHEAD, last - c - 1)], count, edges);
+        __builtin_prefetch(contacts + std::min(count + 4 * CONTACTS_AHEAD, last - c));
+        take(contacts[count], contacts[std::min(count + CONTACTS_AHEAD, last - c - 1)], count, edges);
         ++count;
       }
       kernel(edges, count, block);
