@@ -53,9 +53,10 @@ HWY_INLINE Vectors unitOr(const Vectors& v, const Vectors& fallback) {
   return select(hn::And(hn::Gt(n, hn::Zero(D())), isFinite(n)), divided, fallback);
 }
 
-HWY_INLINE Vectors load(const double (&x)[3][TOUCHES], size_t i) {
-  const D d;
-  return {hn::LoadU(d, x[0] + i), hn::LoadU(d, x[1] + i), hn::LoadU(d, x[2] + i)};
+HWY_INLINE Vectors load(const double (&x)[TOUCHES][3], size_t i) {
+  Vectors out;
+  hn::LoadInterleaved3(D(), x[i], out.x, out.y, out.z);
+  return out;
 }
 HWY_INLINE void store(const Vectors& v, double (&x)[3][TOUCHES], size_t i) {
   const D d;

@@ -12,7 +12,7 @@ constexpr std::size_t TOUCHES = 32;  ///< lanes of a block
 
 /// Pairs of one kind. What a function below does not name it neither reads nor writes.
 struct TouchBlock {
-  double x[2][4][3][TOUCHES] = {};  ///< [m] at t0 and t1: of each vertex of the pair, in the order of Contact::vertex
+  double x[2][4][TOUCHES][3] = {};  ///< [m] at t0 and t1: of each vertex of the pair, in the order of Contact::vertex
   double toc[TOUCHES] = {};         ///< [0,1] of the step
   double point[3][TOUCHES] = {}, normal[3][TOUCHES] = {};
   double weights[4][TOUCHES] = {}, approach_speed[TOUCHES] = {};  ///< as in ContactGeometry

@@ -39,8 +39,24 @@ void countContacts(Outcome& outcome) {
   outcome.earliest_unexpected_toc = earliest_unexpected;
 }
 
+/// Takes those off the list of which keep(i) is false, with what is said of each.
+template <class Keep>
+void keepThose(const Keep& keep, Outcome& outcome) {
+  std::vector<Contact>& contacts = outcome.contacts;
+  std::vector<std::uint32_t>& patch_of = outcome.patch_of;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (!keep(i)) continue;
+    if (!patch_of.empty()) patch_of[kept] = patch_of[i];
+    contacts[kept++] = contacts[i];
+  }
+  contacts.resize(kept);
+  if (!patch_of.empty()) patch_of.resize(kept);
+}
+
 /// Unexpected ones first: an alarm must not be crowded out by what rests where it is meant to.
-void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
+void keepEarliest(std::size_t count, Outcome& outcome) {
+  std::vector<Contact>& contacts = outcome.contacts;
   if (contacts.size() <= count) return;
   std::vector<std::tuple<bool, double, std::size_t>> times;  // and places: of equal times the first are kept
   times.reserve(contacts.size());
@@ -48,12 +64,9 @@ void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   for (std::size_t i = 0; i < contacts.size(); ++i) times.push_back(timeOf(i));
   const auto first_left_out = times.begin() + static_cast<std::ptrdiff_t>(count);
   std::nth_element(times.begin(), first_left_out, times.end());
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    if (timeOf(i) < *first_left_out) contacts[kept++] = contacts[i];
-  }
-  contacts.resize(kept);
+  keepThose([&](std::size_t i) { return timeOf(i) < *first_left_out; }, outcome);
   contacts.shrink_to_fit();
+  outcome.patch_of.shrink_to_fit();
 }
 
 /// Is every vertex on an edge or a face left out? Then nothing of the body was looked at.
@@ -191,9 +204,9 @@ std::size_t suppressInitial(Outcome& outcome) {
   const auto goes = [](const Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; };
   const auto unexpected =
       std::count_if(contacts.begin(), contacts.end(), [&](const Contact& c) { return goes(c) && !c.expected; });
-  const auto kept = std::remove_if(contacts.begin(), contacts.end(), goes);
-  outcome.suppressed = static_cast<std::size_t>(contacts.end() - kept);
-  contacts.erase(kept, contacts.end());
+  const std::size_t before = contacts.size();
+  keepThose([&](std::size_t i) { return !goes(contacts[i]); }, outcome);
+  outcome.suppressed = before - contacts.size();
   return static_cast<std::size_t>(unexpected);
 }
 
@@ -265,7 +278,7 @@ void conclude(const Options& options, const Step& step, std::size_t needed_parts
   // In this order: the counts are of all that is reported, listed or not, and judge() compares them with the list.
   const std::size_t suppressed_unexpected = options.suppress_initial ? suppressInitial(outcome) : 0;
   countContacts(outcome);
-  keepEarliest(options.max_contacts, outcome.contacts);
+  keepEarliest(options.max_contacts, outcome);
   judge(options, step, needed_parts, outcome);
   outcome.stats[Effect::OWN_VOXELS].in = step.map.own.looked_at;
   outcome.stats[Effect::OWN_VOXELS].out = step.map.own.own + step.map.own.doubted;

@@ -99,7 +99,6 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (options.patches) findPatches(outcome);
   prepared.left_out.sayForNoise(step, options, scene, outcome.unproved);
   conclude(options, step, needed, outcome);
-  if (options.patches) patches.list(outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) measureHits(hits, outcome.stats);
   guard.done = true;
@@ -118,7 +117,7 @@ void History::Impl::findPatches(Outcome& outcome) {
   patches.run(prepared.threads, outcome);
   StageStats& stats = outcome.stats[Effect::PATCHES];
   patches_took_ = Clock::now() - start;
-  stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
+  stats = {patches.touchCount(), outcome.patches.size(), msSince(start)};
 }
 
 /// How far apart things are in a part, after its contacts: of a budget too small for both these come first.

@@ -20,11 +20,11 @@ bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
 
 }  // namespace
 
-void PatchTracker::Trace::clear() {
+void PatchTracker::Trace::resize(std::size_t size) {
+  spots.resize(size);
+  known.resize(size);
   releaseBurst(spots);
   releaseBurst(known);
-  spots.clear();
-  known.clear();
 }
 
 PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
@@ -51,12 +51,12 @@ void PatchTracker::seam(std::size_t body) {
     at = living_.erase(at);
   }
   if (body == ALL) {
-    trace_.clear();
+    trace_.resize(0);
     has_last_ = false;
     return;
   }
   std::swap(trace_, all_);
-  trace_.clear();
+  trace_.resize(0);
   for (std::size_t i = 0; i < all_.spots.size(); ++i) {
     if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
   }
@@ -90,6 +90,7 @@ void PatchTracker::tell(Outcome& outcome) {
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
   takeBodies(outcome.step->bodies);
+  std::swap(all_, trace_);
   merge(found.spots(), outcome);
   findParts(found, outcome);
   findNewVoxels(found, outcome);
@@ -126,11 +127,11 @@ void PatchTracker::takeBodies(const std::vector<Body>& bodies) {
   }
   if (same) return;
   graph_.setBodies(bodies);
-  for (Touch& spot : trace_.spots) {
-    for (std::size_t side = 0; side < 2 && spot.point[side] != NO_INDEX; ++side) {
-      const auto next = std::upper_bound(begin.begin(), begin.end(), spot.point[side]);
+  for (TouchGraph::Spot& spot : trace_.spots) {
+    for (std::size_t side = 0; side < 2 && spot.vertex[side] != NO_INDEX; ++side) {
+      const auto next = std::upper_bound(begin.begin(), begin.end(), spot.vertex[side]);
       const auto body = static_cast<std::size_t>(next - begin.begin()) - 1;
-      spot.point[side] += graph_.firstVertex(body) - begin[body];
+      spot.vertex[side] += graph_.firstVertex(body) - begin[body];
     }
   }
 }
@@ -141,6 +142,8 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
+  all_.resize(0);
+  all_ = trace_;
   merge(found.spots(), outcome);
   findParts(found, outcome);
   findNews();
@@ -214,42 +217,34 @@ void PatchTracker::goOn(const Outcome& outcome) {
   if (map_seen_) map_clock_ns_ += duration_ns;
 }
 
-/// Joins the trace and what touches in this step into all_, each pair of vertices once.
+/// Adds what touches in this step to the trace, which all_ is before, each pair of vertices once.
 void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& outcome) {
-  all_.clear();
-  releaseBurst(before_);
-  before_.clear();
-  if (std::exchange(half_merged_, true)) last_at_.clear();
-  last_at_.resize(graph_.vertexCount(), NO_INDEX);
-  const auto add = [&](const Touch& spot, const Known& known) {
-    std::uint32_t& last = last_at_[spot.point[0]];
-    before_.push_back(last);
-    last = static_cast<std::uint32_t>(all_.spots.size());
-    all_.push(spot, known);
-  };
   // After a burst of contacts the trace would cost every later step as much, so it is forgotten early.
   const std::size_t kept = std::max(tolerance::TRACE_PER_SPOT * spots.size(), tolerance::TRACE_ALWAYS);
-  forgot_burst_ = trace_.spots.size() > kept;
-  for (std::size_t i = 0; !forgot_burst_ && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
+  forgot_burst_ = all_.spots.size() > kept;
+  if (forgot_burst_) all_.resize(0);
+  releaseBurst(before_);
+  before_.resize(all_.spots.size());
+  if (std::exchange(half_merged_, true)) last_at_.clear();
+  last_at_.resize(graph_.vertexCount(), NO_INDEX);
+  for (std::uint32_t i = 0; i < before_.size(); ++i) {
+    before_[i] = std::exchange(last_at_[all_.spots[i].vertex[0]], i);
+  }
   releaseBurst(current_);
   current_.assign(all_.spots.size(), NO_PATCH);
   for (const PatchSpot& spot : spots) {
     std::uint32_t at = last_at_[spot.vertex];
-    while (at != NO_INDEX && all_.spots[at].point[1] != spot.across) at = before_[at];
+    while (at != NO_INDEX && all_.spots[at].vertex[1] != spot.across) at = before_[at];
     if (at == NO_INDEX) {
-      Touch touch;
-      touch.body = outcome.patches[spot.patch].body;
-      touch.kind = touch.onMap() ? static_cast<std::uint8_t>(PairKind::VERTEX_VOXEL_FACE) : Touch::VERTICES;
-      touch.point[0] = spot.vertex;
-      touch.point[1] = spot.across;
       at = static_cast<std::uint32_t>(all_.spots.size());
-      add(touch, Known());
+      all_.push({{spot.vertex, spot.across}, outcome.patches[spot.patch].body}, Known());
+      before_.push_back(std::exchange(last_at_[spot.vertex], at));
       current_.push_back(NO_PATCH);
     }
     all_.spots[at].expected = spot.expected;
     current_[at] = spot.patch;
   }
-  for (const Touch& spot : all_.spots) last_at_[spot.point[0]] = NO_INDEX;
+  for (const TouchGraph::Spot& spot : all_.spots) last_at_[spot.vertex[0]] = NO_INDEX;
   half_merged_ = false;
 }
 
@@ -257,35 +252,44 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
 /// Asked only where the map is another one than in the step before.
 void PatchTracker::findNewVoxels(const PatchMaker& found, const Outcome& outcome) {
   if (last_map_ != outcome.obstacle && has_last_) {
-    for (std::size_t t = 0; t < found.touches().size(); ++t) {
-      const Touch& touch = found.touches()[t];
-      Part& part = parts_[part_of_patch_[found.patchOf()[t]]];
-      if (part.map_changed || !part.before.empty() || !touch.initial || !touch.onMap()) continue;
-      part.map_changed = isNewOnMap(touch, outcome);
+    for (const PatchLeaf& leaf : found.leaves()) {
+      Part& part = parts_[part_of_patch_[leaf.patch]];
+      if (part.map_changed || !part.before.empty() || !leaf.initial) continue;
+      part.map_changed = isNewOnMap(leaf, outcome);
     }
   }
   last_map_ = outcome.obstacle;
   last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
-bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
+bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) const {
   if (!last_map_) return true;
-  const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, touch.level);
-  const VoxelKey key = touch.voxel();
-  const Vec3 center(voxelPlane(key.x, resolution_m) + half, voxelPlane(key.y, resolution_m) + half,
-                    voxelPlane(key.z, resolution_m) + half);
+  const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, leaf.level);
+  const Vec3 center(voxelPlane(leaf.voxel.x, resolution_m) + half, voxelPlane(leaf.voxel.y, resolution_m) + half,
+                    voxelPlane(leaf.voxel.z, resolution_m) + half);
   return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
 }
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
   // Where all that touched still does, the patches of the step are the parts.
   const bool same = all_.spots.size() == found.spots().size();
-  part_of_ = same ? &current_ : &graph_.components(all_.spots);
+  releaseBurst(part_of_);
+  if (same) {
+    part_of_ = current_;
+  } else {
+    graph_.clear();
+    graph_.add(all_.spots.data(), all_.spots.data() + all_.spots.size());
+    graph_.findPatches();
+    part_of_.clear();
+    graph_.forEach([&](const TouchGroup&, std::uint32_t first, std::uint32_t last, std::uint32_t part) {
+      part_of_.insert(part_of_.end(), last - first, part);
+    });
+  }
   releaseBurst(parts_);
-  parts_.assign(same ? outcome.patches.size() : graph_.componentCount(), Part());
+  parts_.assign(same ? outcome.patches.size() : graph_.patchCount(), Part());
   part_of_patch_.assign(outcome.patches.size(), 0);
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    const std::uint32_t part = (*part_of_)[i];
+    const std::uint32_t part = part_of_[i];
     const std::uint64_t id = all_.known[i].id;
     std::vector<std::uint64_t>& before = parts_[part].before;
     if (id != 0 && (before.empty() || before.back() != id)) before.push_back(id);
@@ -378,16 +382,16 @@ void PatchTracker::begin(Outcome& outcome) {
 
 /// The step becomes the trace, without what has not touched for longer than the gap.
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
-  trace_.clear();
   alive_.clear();
   for (auto& [id, living] : living_) living.unexpected = false;
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    Touch& spot = all_.spots[i];
-    Known known = all_.known[i];
-    const std::int64_t clock_ns = spot.onMap() ? map_clock_ns_ : mesh_clock_ns_;
+    TouchGraph::Spot& spot = all_.spots[i];
+    Known& known = all_.known[i];
+    const std::int64_t clock_ns = spot.body[1] == OBSTACLE_BODY ? map_clock_ns_ : mesh_clock_ns_;
     if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
     if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) continue;
-    Part& part = parts_[(*part_of_)[i]];
+    Part& part = parts_[part_of_[i]];
     if (part.touches) {
       known.id = part.id;
       // All of it is expected now: what was not, when other things were expected, is over.
@@ -397,8 +401,11 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
       if (alive_.empty() || alive_.back() != known.id) alive_.push_back(known.id);
       if (!spot.expected) living_.at(known.id).unexpected = true;
     }
-    trace_.push(spot, known);
+    all_.spots[kept] = spot;
+    all_.known[kept++] = known;
   }
+  all_.resize(kept);
+  std::swap(all_, trace_);
   for (auto& [id, living] : living_) {
     const bool seen = living.body[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
     if (seen && living.released_ns == UNKNOWN_NS) living.released_ns = outcome.start_ns;

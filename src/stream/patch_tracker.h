@@ -50,10 +50,10 @@ class PatchTracker {
   };
   /// Spots that touched; each pair of vertices is there once.
   struct Trace {
-    std::vector<Touch> spots;
+    std::vector<TouchGraph::Spot> spots;
     std::vector<Known> known;
-    void clear();
-    void push(const Touch& spot, const Known& is) {
+    void resize(std::size_t size);
+    void push(const TouchGraph::Spot& spot, const Known& is) {
       spots.push_back(spot);
       known.push_back(is);
     }
@@ -77,7 +77,7 @@ class PatchTracker {
   void merge(const std::vector<PatchSpot>& spots, const Outcome& outcome);
   void findParts(const PatchMaker& found, const Outcome& outcome);
   void findNewVoxels(const PatchMaker& found, const Outcome& outcome);
-  bool isNewOnMap(const Touch& touch, const Outcome& outcome) const;
+  bool isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) const;
   void keepIdentities(Outcome& outcome);
   void name(Outcome& outcome) const;
   void begin(Outcome& outcome);
@@ -108,13 +108,13 @@ class PatchTracker {
 
   // Buffers of a step.
   TouchGraph graph_;
-  Trace all_;                                            // the trace, then what is new in the step
-  bool forgot_burst_ = false;                            // the trace is not in all_
-  std::vector<std::uint32_t> current_;                   // per one of these its patch in the step; NO_PATCH: none
-  const std::vector<std::uint32_t>* part_of_ = nullptr;  // per one of these
-  std::vector<std::uint32_t> last_at_;                   // per vertex: the last one of these there; NO_INDEX
-  std::vector<std::uint32_t> before_;                    // per one of these: the one before it at the same vertex
-  bool half_merged_ = false;                             // a merge has not come to its end, and last_at_ is not as new
+  Trace all_;                           // the trace, then what is new in the step
+  bool forgot_burst_ = false;           // the trace is not in all_
+  std::vector<std::uint32_t> current_;  // per one of these its patch in the step; NO_PATCH: none
+  std::vector<std::uint32_t> part_of_;  // per one of these
+  std::vector<std::uint32_t> last_at_;  // per vertex: the last one of these there; NO_INDEX
+  std::vector<std::uint32_t> before_;   // per one of these: the one before it at the same vertex
+  bool half_merged_ = false;            // a merge has not come to its end, and last_at_ is not as new
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
   std::vector<std::uint64_t> alive_;  // ascending

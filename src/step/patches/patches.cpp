@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "obstacle/burst.h"
 #include "step/pairs/closest_points.h"
@@ -9,8 +10,6 @@
 
 namespace dccd {
 namespace {
-
-constexpr std::size_t AHEAD = 8;  // touches that are fetched from memory
 
 Vec3 along(const Body& body, Index v, double toc) {
   const Vec3 &from = (*body.t0)[v], &to = (*body.t1)[v];
@@ -21,6 +20,16 @@ Vec3 along(const Body& body, Index v, double toc) {
 Vec3 throughPlane(const Vec3& p, const Vec3& q, const Vec3& corner, const Vec3& normal) {
   const double from = normal.dot(p - corner), to = normal.dot(q - corner), share = from / (from - to);
   return std::isfinite(share) ? Vec3(p + std::clamp(share, 0.0, 1.0) * (q - p)) : Vec3(0.5 * (p + q));
+}
+
+/// Of two features of meshes, as lanes have it.
+Vec3 normalOf(const Outcome& outcome, const Contact& contact) {
+  if (outcome.substeps > 1) return contactGeometry(outcome, contact).normal;
+  const auto at = [&](int i) { return (*outcome.step->bodies[contact.bodyOf(i)].t0)[contact.vertex[i]]; };
+  const Vec3 v0 = at(0), v1 = at(1), v2 = at(2), v3 = at(3);
+  const bool edges = contact.kind == PairKind::EDGE_EDGE;
+  const Vec3 normal = unitOr(edges ? (v1 - v0).cross(v3 - v2) : (v2 - v1).cross(v3 - v1), Vec3::Zero());
+  return normal.dot(v0 - (edges ? v2 : v1)) < 0 ? Vec3(-normal) : normal;
 }
 
 /// Ties stay in the canonical order.
@@ -40,64 +49,47 @@ const char* toString(PatchEventKind kind) {
   return NAMES[static_cast<std::size_t>(kind)];
 }
 
-void PatchMaker::begin(const Outcome& outcome) {
-  releaseBurst(touches_);
-  releaseBurst(order_);
-  releaseBurst(parts_);
-  releaseBurst(spots_);
-  spots_.clear();
-  unexpected_.clear();
+void PatchMaker::begin(Outcome& outcome) {
+  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
+  empty(first_of_, newest_part_, parts_, stretches_, by_patch_, spots_, leaves_);
+  graph_.clear();
   graph_.setBodies(outcome.step->bodies);
-  contacts_ = outcome.contacts.size();
-  releaseBurst(places_);
-  places_.resize(contacts_);
+  const std::vector<Contact>& contacts = outcome.contacts;
+  const std::vector<StartIntersection>& met = outcome.intersections;
+  contacts_ = contacts.size();
+  graph_.add(contacts.data(), contacts.data() + contacts.size());
   // They come first: a vertex inside of the map is a contact as well, and a body inside of another touches nothing.
-  const auto& met = outcome.intersections;
   const auto crosses = [](const StartIntersection& one) { return one.vertex[4] != NO_INDEX; };
-  const auto crossings = std::partition_point(met.begin(), met.end(), crosses) - met.begin();
-  touches_.resize(contacts_ + static_cast<std::size_t>(crossings));
-}
-
-void PatchMaker::findTouches(const Outcome& outcome, std::size_t first, std::size_t last) {
-  // In place: a copy would wait for bytes to be joined to words.
-  for (std::size_t t = first; t < last; ++t) {
-    void* const at = &touches_[t];
-    t < contacts_ ? new (at) Touch(graph_.touchOf(outcome.contacts[t]))
-                  : new (at) Touch(graph_.touchOf(outcome.intersections[t - contacts_]));
-  }
-}
-
-void PatchMaker::connect() {
-  patch_of_ = &graph_.components(touches_);
-  const std::size_t count = graph_.componentCount();
-  begin_.assign(count + 2, 0);
-  for (const std::uint32_t p : *patch_of_) ++begin_[p + 2];
-  for (std::size_t p = 1; p < begin_.size(); ++p) begin_[p] += begin_[p - 1];
-  order_.resize(touches_.size());
-  for (std::uint32_t t = 0; t < touches_.size(); ++t) order_[begin_[(*patch_of_)[t] + 1]++] = t;
-  parts_.assign(count + pieces(), Part());
+  graph_.add(met.data(), met.data() + (std::partition_point(met.begin(), met.end(), crosses) - met.begin()));
+  graph_.findPatches();
+  outcome.patches.resize(graph_.patchCount());
+  outcome.patch_of.resize(contacts_);
+  graph_.forEach([&](const TouchGroup& group, std::uint32_t first, std::uint32_t last, std::uint32_t patch) {
+    if (patch == first_of_.size()) {
+      first_of_.push_back(first);
+      newest_part_.push_back(NO_INDEX);
+      outcome.patches[patch].body = group.partners();
+    }
+    if (first < contacts_) std::fill_n(outcome.patch_of.begin() + first, last - first, patch);
+    for (std::uint32_t t = first, next; t < last; t = next) {
+      const std::uint32_t piece = t / PIECE;
+      next = std::min(last, (piece + 1) * PIECE);
+      std::uint32_t& part = newest_part_[patch];
+      if (part == NO_INDEX || parts_[part].piece != piece) {
+        part = static_cast<std::uint32_t>(parts_.size());
+        parts_.emplace_back(patch, piece);
+      }
+      stretches_.push_back({&group, t, next, patch, part});
+    }
+  });
 }
 
 PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, const Contact& contact) const {
-  if (outcome.substeps == 1) return placeOnMap(outcome, contact);
-  const ContactGeometry geometry = contactGeometry(outcome, contact);
-  return {geometry.point, geometry.normal};
-}
-
-Vec3 PatchMaker::pointOfCrossing(const Outcome& outcome, const Touch& touch) const {
-  const auto at = [&](int i, int side) -> const Vec3& {
-    return (*outcome.step->bodies[touch.body[side]].t0)[touch.point[i] - graph_.firstVertex(touch.body[side])];
-  };
-  const Vec3 &f0 = at(2, 1), &f1 = at(3, 1), &f2 = at(4, 1);
-  return throughPlane(at(0, 0), at(1, 0), f0, (f1 - f0).cross(f2 - f0));
-}
-
-void PatchMaker::findPlaces(const Outcome& outcome, std::size_t piece) {
-  const auto use = [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
-    places_[c] = {laneOf(block.point, lane), laneOf(block.normal, lane)};
-  };
-  const auto other = [&](std::size_t c) { places_[c] = placeOf(outcome, outcome.contacts[c]); };
-  inLanes<true>(outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces, use, other);
+  if (outcome.substeps > 1) {
+    const ContactGeometry geometry = contactGeometry(outcome, contact);
+    return {geometry.point, geometry.normal};
+  }
+  return placeOnMap(outcome, contact);
 }
 
 /// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.
@@ -130,39 +122,25 @@ PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& 
   return {turn * (point - map_from_fixed.translation()), turn * normal};
 }
 
-void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
-  const std::size_t end = std::min(touches_.size(), (piece + 1) * PIECE);
-  for (std::size_t i = piece * PIECE; i < end;) {
-    const std::uint32_t p = (*patch_of_)[order_[i]], first = order_[begin_[p]];
-    const bool crosses_alone = first >= contacts_;  // only then do crossings say where the patch is
-    const Vec3 first_normal = crosses_alone ? Vec3(Vec3::Zero()) : places_[first].normal;
-    Part& part = parts_[piece + p];
-    for (const std::size_t end_of_patch = std::min<std::size_t>(end, begin_[p + 1]); i < end_of_patch; ++i) {
-      const std::uint32_t t = order_[i], ahead = order_[std::min(i + AHEAD, end - 1)];
-      if (ahead < contacts_) {
-        __builtin_prefetch(&places_[ahead]);
-        __builtin_prefetch(&outcome.contacts[ahead]);
-      }
-      if (t < contacts_) {
-        addContact(outcome.contacts[t], places_[t], first_normal, part);
-      } else {
-        addCrossing(outcome, touches_[t], crosses_alone, part);
-      }
-    }
-  }
-}
-
-void PatchMaker::addContact(const Contact& contact, const Place& at, const Vec3& first_normal, Part& part) {
-  part.expected += contact.expected;
-  if (!contact.expected) (contact.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
-  part.centroid += at.point;
-  part.box.min = part.box.min.cwiseMin(at.point);
-  part.box.max = part.box.max.cwiseMax(at.point);
+inline void PatchMaker::addContact(const Outcome& outcome, std::size_t c, const Vec3& point, const Vec3& normal,
+                                   Part& part) const {
+  const Contact& contact = outcome.contacts[c];
   // Of a body with itself neither side is the first: all are turned to the side of the first one.
   const bool self = contact.body[0] == contact.body[1];
-  const bool turned = self ? first_normal.dot(at.normal) < 0 : contact.body[0] > contact.body[1];
-  part.normal += turned ? Vec3(-at.normal) : at.normal;
-  if (part.contacts == 0 || isEarlier(contact, part.earliest)) part.earliest = contact;
+  if (part.contacts == 0) {
+    part.earliest = static_cast<std::uint32_t>(c);
+    const std::size_t first = first_of_[part.patch];
+    if (self) part.first_normal = first == c ? normal : normalOf(outcome, outcome.contacts[first]);
+  }
+  part.expected += contact.expected;
+  if (!contact.expected) (contact.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
+  part.points += point;
+  part.box.min = part.box.min.cwiseMin(point);
+  part.box.max = part.box.max.cwiseMax(point);
+  // Which way is not foreseeable: no branch. The sum is never -0.
+  const double side = self ? part.first_normal.dot(normal) + 0.0 : contact.body[0] > contact.body[1] ? -1 : 1;
+  part.normals += std::copysign(1.0, side) * normal;
+  if (isEarlier(contact, outcome.contacts[part.earliest])) part.earliest = static_cast<std::uint32_t>(c);
   ++part.contacts;
   part.certain += contact.certainty == Certainty::CERTAIN;
   part.initial += contact.initial;
@@ -170,45 +148,64 @@ void PatchMaker::addContact(const Contact& contact, const Place& at, const Vec3&
   part.toc_upper = std::min(part.toc_upper, contact.toc_upper);
 }
 
-void PatchMaker::addCrossing(const Outcome& outcome, const Touch& touch, bool alone, Part& part) const {
-  part.expected += touch.expected;
-  if (!touch.expected) part.unexpected.is_initial = true;
+void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
+  const std::size_t first = piece * PIECE, last = std::min(touchCount(), first + PIECE);
+  const auto is_before = [](const Stretch& stretch, std::size_t touch) { return stretch.first < touch; };
+  auto stretch = std::lower_bound(stretches_.begin(), stretches_.end(), first, is_before);
+  const auto partOf = [&](std::size_t touch) -> Part& {
+    while (stretch->last <= touch) ++stretch;
+    return parts_[stretch->part];
+  };
+  const auto use = [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
+    addContact(outcome, c, laneOf(block.point, lane), laneOf(block.normal, lane), partOf(c));
+  };
+  const auto other = [&](std::size_t c) {
+    const Place at = placeOf(outcome, outcome.contacts[c]);
+    addContact(outcome, c, at.point, at.normal, partOf(c));
+  };
+  inLanes<true>(outcome, first, std::min(last, contacts_), simd::touchPlaces, use, other);
+  for (std::size_t t = std::max(first, contacts_); t < last; ++t) {
+    addCrossing(outcome, outcome.intersections[t - contacts_], partOf(t));
+  }
+}
+
+void PatchMaker::addCrossing(const Outcome& outcome, const StartIntersection& crossing, Part& part) const {
+  part.expected += crossing.expected;
+  if (!crossing.expected) part.unexpected.is_initial = true;
   ++part.crossings;
   part.toc_lower = part.toc_upper = 0;
-  if (!alone) return;
-  const Vec3 point = pointOfCrossing(outcome, touch);
-  part.centroid += point;
+  if (first_of_[part.patch] < contacts_) return;  // crossings say where the patch is only if nothing else does
+  const auto at = [&](int i) { return (*outcome.step->bodies[crossing.body[i < 2 ? 0 : 1]].t0)[crossing.vertex[i]]; };
+  const Vec3 f0 = at(2), f1 = at(3), f2 = at(4), point = throughPlane(at(0), at(1), f0, (f1 - f0).cross(f2 - f0));
+  part.points += point;
   part.box.min = part.box.min.cwiseMin(point);
   part.box.max = part.box.max.cwiseMax(point);
 }
 
 void PatchMaker::make(Outcome& outcome) {
   std::vector<Patch>& patches = outcome.patches;
-  patches.resize(graph_.componentCount());
   unexpected_.assign(patches.size(), PatchUnexpected());
+  for (const Part& part : parts_) {
+    Patch& patch = patches[part.patch];
+    if (part.contacts > 0 && (patch.contacts == 0 || isEarlier(outcome.contacts[part.earliest], patch.earliest))) {
+      patch.earliest = outcome.contacts[part.earliest];
+    }
+    unexpected_[part.patch].is_new |= part.unexpected.is_new;
+    unexpected_[part.patch].is_initial |= part.unexpected.is_initial;
+    patch.contacts += part.contacts;
+    patch.certain += part.certain;
+    patch.initial += part.initial;
+    patch.crossings += part.crossings;
+    patch.expected += part.expected;
+    patch.toc_lower = std::min(patch.toc_lower, part.toc_lower);
+    patch.toc_upper = std::min(patch.toc_upper, part.toc_upper);
+    patch.centroid += part.points;
+    patch.normal += part.normals;
+    patch.box.min = patch.box.min.cwiseMin(part.box.min);
+    patch.box.max = patch.box.max.cwiseMax(part.box.max);
+  }
   for (std::size_t p = 0; p < patches.size(); ++p) {
     Patch& patch = patches[p];
-    patch.body = touches_[order_[begin_[p]]].body;
-    if (patch.body[0] > patch.body[1]) std::swap(patch.body[0], patch.body[1]);
-    for (std::size_t piece = begin_[p] / PIECE; piece * PIECE < begin_[p + 1]; ++piece) {
-      const Part& part = parts_[piece + p];
-      if (part.contacts > 0 && (patch.contacts == 0 || isEarlier(part.earliest, patch.earliest))) {
-        patch.earliest = part.earliest;
-      }
-      unexpected_[p].is_new |= part.unexpected.is_new;
-      unexpected_[p].is_initial |= part.unexpected.is_initial;
-      patch.contacts += part.contacts;
-      patch.certain += part.certain;
-      patch.initial += part.initial;
-      patch.crossings += part.crossings;
-      patch.expected += part.expected;
-      patch.toc_lower = std::min(patch.toc_lower, part.toc_lower);
-      patch.toc_upper = std::min(patch.toc_upper, part.toc_upper);
-      patch.centroid += part.centroid;
-      patch.normal += part.normal;
-      patch.box.min = patch.box.min.cwiseMin(part.box.min);
-      patch.box.max = patch.box.max.cwiseMax(part.box.max);
-    }
     patch.centroid /= static_cast<double>(patch.contacts > 0 ? patch.contacts : patch.crossings);
     patch.normal = unitOr(patch.normal, Vec3::Zero());
     const bool self = patch.body[0] == patch.body[1];
@@ -219,12 +216,12 @@ void PatchMaker::make(Outcome& outcome) {
 /// Of the faces that have a vertex that touches something; where it is when the step begins.
 void PatchMaker::findVertexAreas(const Step& step) {
   vertex_area_.assign(graph_.vertexCount(), 0);
-  const auto isTouched = [&](Index vertex) { return seen_[vertex].patch != NO_PATCH; };
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     const Index base = graph_.firstVertex(b);
     const Positions& x = *step.bodies[b].t0;
+    const std::uint32_t* const seen = seen_patch_.data() + base;
     for (const Face& face : step.bodies[b].topology->faces()) {
-      if (!isTouched(base + face[0]) && !isTouched(base + face[1]) && !isTouched(base + face[2])) continue;
+      if ((seen[face[0]] & seen[face[1]] & seen[face[2]]) == NO_PATCH) continue;  // none of them touches anything
       const double third = (x[face[1]] - x[face[0]]).cross(x[face[2]] - x[face[0]]).norm() / 6;
       if (!std::isfinite(third)) continue;
       for (const Index v : face) vertex_area_[base + v] += third;
@@ -235,69 +232,92 @@ void PatchMaker::findVertexAreas(const Step& step) {
 void PatchMaker::findAreas(const Outcome& outcome) {
   findSpots();
   findVertexAreas(*outcome.step);
-  areas_.assign(2 * graph_.componentCount(), 0);
+  findLeaves(outcome);
+  areas_.assign(2 * graph_.patchCount(), 0);
   for (const PatchSpot& spot : spots_) areas_[2 * spot.patch + spot.side] += vertex_area_[spot.vertex];
-  for (std::uint32_t p = 0; p < graph_.componentCount(); ++p) {
-    if (touches_[order_[begin_[p]]].onMap()) areas_[2 * p + 1] = leafArea(p, outcome.obstacle->resolution());
+  for (const PatchLeaf& leaf : leaves_) {
+    const double edge_m = std::ldexp(outcome.obstacle->resolution(), leaf.level);
+    areas_[2 * leaf.patch + 1] += edge_m * edge_m;
   }
 }
 
+/// Patch by patch: of a vertex only the last patch that had it needs to be known.
 void PatchMaker::findSpots() {
-  seen_.assign(graph_.vertexCount(), {NO_PATCH, 0});
-  for (std::uint32_t patch = 0; patch < graph_.componentCount(); ++patch) {
-    bool some_expected = false;  // of the patch's spots
-    for (std::uint32_t k = begin_[patch]; k < begin_[patch + 1]; ++k) {
-      const Touch& touch = touches_[order_[k]];
-      const int first = touch.firstSize(), all = touch.size();
-      for (int i = 0; i < all; ++i) {
-        const Index vertex = touch.point[i];
-        Seen& seen = seen_[vertex];
-        if (seen.patch == patch) {
-          if (some_expected && !touch.expected) spots_[seen.spot].expected = false;
-          continue;
-        }
-        seen = {patch, static_cast<std::uint32_t>(spots_.size())};
-        some_expected = some_expected || touch.expected;
-        const bool is_first = i < first;
-        const Index across = touch.onMap() ? NO_INDEX : touch.point[is_first ? first : 0];
-        const auto side =
-            static_cast<std::uint8_t>(touch.body[is_first ? 0 : 1] != std::min(touch.body[0], touch.body[1]));
-        spots_.push_back({vertex, across, patch, side, touch.expected});
+  by_patch_.resize(stretches_.size());
+  std::vector<std::uint32_t> ends(graph_.patchCount() + 1, 0);
+  for (const Stretch& stretch : stretches_) ++ends[stretch.patch + 1];
+  for (std::size_t p = 1; p < ends.size(); ++p) ends[p] += ends[p - 1];
+  for (const Stretch& stretch : stretches_) by_patch_[ends[stretch.patch]++] = stretch;
+  seen_patch_.assign(graph_.vertexCount(), NO_PATCH);
+  seen_spot_.resize(graph_.vertexCount());
+  bool some_expected = false;  // of the patch's spots
+  std::uint32_t patch = NO_PATCH;
+  for (std::size_t s = 0; s < by_patch_.size(); ++s) {
+    const Stretch &stretch = by_patch_[s], &ahead = by_patch_[std::min(s + 4, by_patch_.size() - 1)];
+    __builtin_prefetch(graph_.verticesOf(*ahead.group, ahead.first));
+    if (stretch.patch != patch) some_expected = false;
+    patch = stretch.patch;
+    const TouchGroup& group = *stretch.group;
+    const auto add = [&](auto size) {
+      const Index* vertices = graph_.verticesOf(group, stretch.first);
+      for (std::uint32_t t = stretch.first; t < stretch.last; ++t, vertices += size) {
+        std::uint32_t other = some_expected;
+        for (int i = 0; i < size; ++i) other |= seen_patch_[vertices[i]] ^ patch;
+        if (other == 0) continue;
+        const bool expected = graph_.isExpected(t);
+        addSpots(stretch, vertices, expected);
+        some_expected |= expected;
       }
+    };
+    if (group.size() == 4) {
+      add(std::integral_constant<int, 4>());
+    } else if (group.size() == 5) {
+      add(std::integral_constant<int, 5>());
+    } else {
+      add(group.size());
     }
   }
 }
 
-/// Each leaf that the patch touches counts once.
-double PatchMaker::leafArea(std::uint32_t patch, double resolution_m) {
-  leaves_.clear();
-  for (std::uint32_t i = begin_[patch]; i < begin_[patch + 1]; ++i) {
-    const Touch& touch = touches_[order_[i]];
-    leaves_.push_back(std::uint64_t{touch.level} << 48 | std::uint64_t{touch.point[3]} << 16 | touch.point[4]);
+void PatchMaker::addSpots(const Stretch& stretch, const Index* vertices, bool expected) {
+  const TouchGroup& group = *stretch.group;
+  for (int i = 0; i < group.size(); ++i) {
+    const bool second = i >= group.sizes[0];
+    const Index vertex = vertices[i];
+    if (seen_patch_[vertex] == stretch.patch) {
+      PatchSpot& spot = spots_[seen_spot_[vertex]];
+      spot.expected = spot.expected && expected;
+      continue;
+    }
+    seen_patch_[vertex] = stretch.patch;
+    seen_spot_[vertex] = static_cast<std::uint32_t>(spots_.size());
+    const Index across = group.onMap() ? NO_INDEX : vertices[second ? 0 : group.sizes[0]];
+    const bool side = group.body[second] != group.partners()[0];
+    PatchSpot& spot = spots_.emplace_back();  // in place: a copy would wait for bytes to be joined to words
+    spot.vertex = vertex;
+    spot.across = across;
+    spot.patch = stretch.patch;
+    spot.side = side;
+    spot.expected = expected;
   }
-  std::sort(leaves_.begin(), leaves_.end());
-  leaves_.erase(std::unique(leaves_.begin(), leaves_.end()), leaves_.end());
-  double area_m2 = 0;
-  for (const std::uint64_t leaf : leaves_) {
-    const double edge_m = std::ldexp(resolution_m, static_cast<int>(leaf >> 48));
-    area_m2 += edge_m * edge_m;
-  }
-  return area_m2;
 }
 
-void PatchMaker::list(Outcome& outcome) const {
-  const std::vector<Contact>& contacts = outcome.contacts;
-  if (contacts.size() == contacts_) {
-    outcome.patch_of.assign(patch_of_->begin(), patch_of_->begin() + static_cast<std::ptrdiff_t>(contacts_));
-    return;
-  }
-  outcome.patch_of.reserve(contacts.size());
-  std::size_t t = 0;
-  for (const Contact& contact : contacts) {
-    const Touch touch = graph_.touchOf(contact);
-    while (touches_[t].key() != touch.key()) ++t;
-    outcome.patch_of.push_back((*patch_of_)[t]);
-  }
+/// Each leaf that a patch touches counts once.
+void PatchMaker::findLeaves(const Outcome& outcome) {
+  graph_.forEach([&](const TouchGroup& group, std::uint32_t first, std::uint32_t last, std::uint32_t patch) {
+    for (std::uint32_t t = first; group.onMap() && t < last; ++t) {
+      const Contact& contact = outcome.contacts[t];
+      PatchLeaf leaf{patch, 0, contact.voxel, contact.initial};
+      while (std::uint32_t{1} << leaf.level < contact.voxel_size) ++leaf.level;
+      leaves_.push_back(leaf);
+    }
+  });
+  const auto key = [](const PatchLeaf& leaf) { return std::tie(leaf.patch, leaf.level, leaf.voxel); };
+  std::sort(leaves_.begin(), leaves_.end(), [&](const PatchLeaf& a, const PatchLeaf& b) {
+    return key(a) < key(b) || (key(a) == key(b) && a.initial > b.initial);
+  });
+  const auto same = [&](const PatchLeaf& a, const PatchLeaf& b) { return key(a) == key(b); };
+  leaves_.erase(std::unique(leaves_.begin(), leaves_.end(), same), leaves_.end());
 }
 
 }  // namespace dccd

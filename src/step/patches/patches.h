@@ -23,84 +23,86 @@ struct PatchUnexpected {
   bool is_new = false, is_initial = false;
 };
 
+/// A leaf of the map that a patch touches, once a patch.
+struct PatchLeaf {
+  std::uint32_t patch = 0;
+  std::uint8_t level = 0;  ///< its edge is 2^level finest voxels
+  VoxelKey voxel;
+  bool initial = false;  ///< the patch touches it when the step begins
+};
+
 /// Buffers are kept from step to step.
 class PatchMaker {
  public:
   /// outcome: contacts in canonical order, none left out yet; intersections, step and obstacle are set. Its patches are
-  /// made; parallel(n, piece, f) calls f(first, last) over [0, n).
+  /// made, and to which of them each contact belongs; parallel(n, piece, f) calls f(first, last) over [0, n).
   template <class Parallel>
   void run(const Parallel& parallel, Outcome& outcome) {
     begin(outcome);
-    parallel(touches_.size(), PIECE, [&](std::size_t first, std::size_t last) { findTouches(outcome, first, last); });
+    const std::size_t touches = touchCount(), pieces = (touches + PIECE - 1) / PIECE;
+    if (touches == 0) return;
     // The first piece of work is of another kind, and as long as several of the others. Few are not worth a thread.
-    const std::size_t grain = touches_.size() < PIECE ? 2 : 1;
-    parallel(piecesOf(contacts_) + 1, grain, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) i == 0 ? connect() : findPlaces(outcome, i - 1);
-    });
-    if (touches_.empty()) return;
-    parallel(pieces() + 1, grain, [&](std::size_t first, std::size_t last) {
+    parallel(pieces + 1, pieces == 1 ? 2 : 1, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) i == 0 ? findAreas(outcome) : measure(outcome, i - 1);
     });
     make(outcome);
   }
-  /// Of the contacts that are listed in the end, which are some of those before: to which patch each belongs.
-  void list(Outcome& outcome) const;
 
-  /// All that touched, in the order of their keys, and the patch of each, as long as the next run() has not begun.
-  const std::vector<Touch>& touches() const { return touches_; }
-  const std::vector<std::uint32_t>& patchOf() const { return *patch_of_; }
-
+  // As long as the next run() has not begun.
+  std::size_t touchCount() const { return graph_.touchCount(); }
   const std::vector<PatchSpot>& spots() const { return spots_; }
   const std::vector<PatchUnexpected>& unexpected() const { return unexpected_; }
+  const std::vector<PatchLeaf>& leaves() const { return leaves_; }  ///< by patch
 
  private:
-  static constexpr std::size_t PIECE = 4096;
+  static constexpr std::uint32_t PIECE = 4096;
   /// Where features touch, and the normal of the touch: towards the first feature, as the step begins.
   struct Place {
     Vec3 point, normal;
   };
-  struct Part : Patch {
+  /// What a piece of the touches gives to a patch.
+  struct Part {
+    std::uint32_t patch, piece;
+    std::uint32_t contacts = 0, certain = 0, initial = 0, crossings = 0, expected = 0;
+    std::uint32_t earliest = 0;  // a contact
+    double toc_lower = 1, toc_upper = 1;
+    Vec3 points = Vec3::Zero(), normals = Vec3::Zero();  // sums
+    Vec3 first_normal;                                   // of a body with itself: of the patch's first contact
+    Box box;
     PatchUnexpected unexpected;
+    Part(std::uint32_t of, std::uint32_t in) : patch(of), piece(in) {}
+  };
+  /// Touches of one part that come one after the other.
+  struct Stretch {
+    const TouchGroup* group;
+    std::uint32_t first, last, patch, part;
   };
 
-  void begin(const Outcome& outcome);
-  void findTouches(const Outcome& outcome, std::size_t first, std::size_t last);
-  void connect();
-  static std::size_t piecesOf(std::size_t count) { return (count + PIECE - 1) / PIECE; }
-  std::size_t pieces() const { return piecesOf(touches_.size()); }
-  void findPlaces(const Outcome& outcome, std::size_t piece);
+  void begin(Outcome& outcome);
   Place placeOf(const Outcome& outcome, const Contact& contact) const;
-  Vec3 pointOfCrossing(const Outcome& outcome, const Touch& touch) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void measure(const Outcome& outcome, std::size_t piece);
-  static void addContact(const Contact& contact, const Place& at, const Vec3& first_normal, Part& part);
-  void addCrossing(const Outcome& outcome, const Touch& touch, bool alone, Part& part) const;
+  void addContact(const Outcome& outcome, std::size_t c, const Vec3& point, const Vec3& normal, Part& part) const;
+  void addCrossing(const Outcome& outcome, const StartIntersection& crossing, Part& part) const;
   void findAreas(const Outcome& outcome);
   void findSpots();
+  void addSpots(const Stretch& stretch, const Index* vertices, bool expected);
   void findVertexAreas(const Step& step);
-  double leafArea(std::uint32_t patch, double resolution_m);
+  void findLeaves(const Outcome& outcome);
   void make(Outcome& outcome);
 
-  TouchGraph graph_;
-  std::vector<Touch> touches_;  // of the contacts, then of the crossings
-  std::vector<Place> places_;   // of the contacts
-  const std::vector<std::uint32_t>* patch_of_ = nullptr;
-  std::vector<std::uint32_t> order_;  // the touches, patch by patch, each patch's ascending
-  std::vector<std::uint32_t> begin_;  // per patch, in order_
-  /// What a piece of order_ gives to a patch: that of piece i to patch p is at i + p, since in order_ with each of them
-  /// either i or p goes on.
+  TouchGraph graph_;  // of the contacts, then of the crossings
+  std::size_t contacts_ = 0;
+  std::vector<std::uint32_t> first_of_, newest_part_;  // per patch: its first touch
   std::vector<Part> parts_;
+  std::vector<Stretch> stretches_, by_patch_;
   std::vector<PatchUnexpected> unexpected_;
   std::vector<double> vertex_area_;  // per vertex of all bodies: a third of the faces around it [m^2]
   std::vector<PatchSpot> spots_;     // patch by patch
-  /// Per vertex: the last patch that had it, and its spot there.
-  struct Seen {
-    std::uint32_t patch, spot;
-  };
-  std::vector<Seen> seen_;
-  std::vector<std::uint64_t> leaves_;  // of a patch
-  std::vector<double> areas_;          // two sides a patch
-  std::size_t contacts_ = 0;
+  // Per vertex: the last patch that had it, and its spot there.
+  std::vector<std::uint32_t> seen_patch_, seen_spot_;
+  std::vector<PatchLeaf> leaves_;
+  std::vector<double> areas_;  // two sides a patch
 };
 
 }  // namespace dccd

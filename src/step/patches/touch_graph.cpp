@@ -1,16 +1,13 @@
 #include "step/patches/touch_graph.h"
 
 #include <algorithm>
+#include <cstring>
 #include <tuple>
+#include <type_traits>
 
 #include "obstacle/burst.h"
 
 namespace dccd {
-namespace {
-
-constexpr std::uint8_t kindOf(PairKind kind) { return static_cast<std::uint8_t>(kind); }
-
-}  // namespace
 
 bool TouchGraph::sameMesh(std::size_t body, const Body& now) const {
   return topologies_[body] == now.topology || *topologies_[body] == *now.topology;
@@ -29,66 +26,76 @@ void TouchGraph::setBodies(const std::vector<Body>& bodies) {
     vertex_begin_.push_back(first + static_cast<Index>(body.topology->vertexCount()));
     topologies_.push_back(body.topology);
   }
-  neighbours_begin_.assign(vertexCount() + 1, 0);
-  neighbours_.resize(2 * edges.size());
-  for (const Edge& edge : edges) {
-    ++neighbours_begin_[edge[0]];
-    ++neighbours_begin_[edge[1]];
-  }
-  std::uint32_t sum = 0;
-  for (std::uint32_t& n : neighbours_begin_) n = sum += n;  // ends, moved down to begins below
-  // Backwards, so that each vertex's are ascending: edges are sorted, those to smaller ones come before all others.
-  for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) {
-    neighbours_[--neighbours_begin_[(*edge)[0]]] = (*edge)[1];
-  }
-  for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) {
-    neighbours_[--neighbours_begin_[(*edge)[1]]] = (*edge)[0];
-  }
+  // Edges are sorted: each vertex's are ascending.
+  neighbours_begin_.assign(vertexCount() + 2, 0);
+  neighbours_.resize(edges.size());
+  for (const Edge& edge : edges) ++neighbours_begin_[edge[1] + 2];
+  for (std::size_t v = 1; v < neighbours_begin_.size(); ++v) neighbours_begin_[v] += neighbours_begin_[v - 1];
+  for (const Edge& edge : edges) neighbours_[neighbours_begin_[edge[1] + 1]++] = edge[0];
   is_touched_.assign(vertexCount(), false);
   area_.resize(vertexCount());
 }
 
-Touch TouchGraph::touchOf(const Contact& contact) const {
-  Touch touch;
-  touch.kind = kindOf(contact.kind);
-  touch.body = contact.body;
-  touch.initial = contact.initial;
-  touch.expected = contact.expected;
-  touch.certain = contact.certainty == Certainty::CERTAIN;
-  const int first = touch.firstSize(), all = first + touch.secondSize();
-  for (int i = 0; i < all; ++i) touch.point[i] = vertex_begin_[contact.body[i < first ? 0 : 1]] + contact.vertex[i];
-  if (touch.onMap()) {
-    touch.point[3] = std::uint32_t{contact.voxel.x} << 16 | contact.voxel.y;
-    touch.point[4] = contact.voxel.z;
-    while (std::uint32_t{1} << touch.level < contact.voxel_size) ++touch.level;
-  }
-  return touch;
+namespace {
+
+constexpr std::ptrdiff_t AHEAD = 32;  // touches that are fetched from memory
+
+std::array<std::uint8_t, 2> sizesOf(const Contact& contact) { return factsOf(contact.kind).vertices; }
+std::array<std::uint8_t, 2> sizesOf(const StartIntersection&) { return {2, 3}; }
+std::array<std::uint8_t, 2> sizesOf(const TouchGraph::Spot& spot) {
+  return {1, static_cast<std::uint8_t>(spot.body[1] == OBSTACLE_BODY ? 0 : 1)};
 }
 
-Touch TouchGraph::touchOf(const StartIntersection& crossing) const {
-  Touch touch;
-  touch.body = crossing.body;
-  touch.initial = true;
-  touch.expected = crossing.expected;
-  for (int i = 0; i < 5; ++i) touch.point[i] = vertex_begin_[crossing.body[i < 2 ? 0 : 1]] + crossing.vertex[i];
-  return touch;
+template <class T>
+bool isAlike(const T& a, const T& b) {
+  return a.body[0] == b.body[0] && a.body[1] == b.body[1] && sizesOf(a) == sizesOf(b);
 }
 
-void TouchGraph::findGroups(const std::vector<Touch>& touches) {
-  groups_.clear();
-  for (std::uint32_t t = 0; t < touches.size(); ++t) {
-    const Touch& touch = touches[t];
-    const auto& body = touch.body;
-    if (t == 0 || touch.kind != touches[t - 1].kind || body[0] != touches[t - 1].body[0] ||
-        body[1] != touches[t - 1].body[1]) {
-      const auto [low, high] = std::minmax(touch.body[0], touch.body[1]);
-      groups_.push_back({{low, high}, t, t});
+}  // namespace
+
+template <class T>
+void TouchGraph::add(const T* first, const T* last) {
+  constexpr std::size_t MOST = std::tuple_size_v<decltype(T::vertex)>;
+  constexpr bool NUMBERED_ON = std::is_same_v<T, Spot>;
+  const auto count = static_cast<std::size_t>(last - first);
+  std::size_t used = vertices_used_;
+  if (vertices_.size() < used + MOST * count) vertices_.resize(used + MOST * count);
+  if (expected_.size() < touch_count_ + count) expected_.resize(touch_count_ + count);
+  for (const T* at = first; at != last;) {
+    const T& head = *at;
+    TouchGroup group{head.body, sizesOf(head), touch_count_, 0, used};
+    std::array<Index, MOST> base{};
+    for (std::size_t i = 0; !NUMBERED_ON && i < static_cast<std::size_t>(group.size()); ++i) {
+      base[i] = vertex_begin_[head.body[i >= group.sizes[0]]];
     }
-    groups_.back().last = t + 1;
+    do {
+      __builtin_prefetch(at + std::min<std::ptrdiff_t>(AHEAD, last - at));
+      // All that there may be, which takes no branch; the next touch overwrites what is too many.
+      for (std::size_t i = 0; i < MOST; ++i) vertices_[used + i] = base[i] + at->vertex[i];
+      used += static_cast<std::size_t>(group.size());
+      expected_[touch_count_++] = at->expected;
+      ++at;
+    } while (at != last && isAlike(head, *at));
+    group.last = touch_count_;
+    groups_.push_back(group);
   }
-  std::sort(groups_.begin(), groups_.end(), [](const Group& a, const Group& b) {
-    return std::tie(a.partners, a.first) < std::tie(b.partners, b.first);
-  });
+  vertices_used_ = used;
+}
+template void TouchGraph::add(const Contact*, const Contact*);
+template void TouchGraph::add(const StartIntersection*, const StartIntersection*);
+template void TouchGraph::add(const Spot*, const Spot*);
+
+void TouchGraph::clear() {
+  // What a burst made of the buffers in the last run is given back.
+  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
+  empty(groups_, by_partners_, named_, runs_, named_of_, number_);
+  const auto shorten = [](auto& buffer, std::size_t used) {
+    if (buffer.size() > KEPT_FOR_USE * used) buffer.resize(used);
+    releaseBurst(buffer, used);
+  };
+  shorten(vertices_, vertices_used_);
+  shorten(expected_, touch_count_);
+  vertices_used_ = touch_count_ = patch_count_ = 0;
 }
 
 Index TouchGraph::areaRoot(Index vertex) {
@@ -97,83 +104,97 @@ Index TouchGraph::areaRoot(Index vertex) {
 }
 
 /// The vertices that touch the partner, joined where an edge of the mesh joins them.
-void TouchGraph::findAreas(const std::vector<Touch>& touches, const Group* first, const Group* last) {
-  for (const Group* group = first; group != last; ++group) {
-    const int size = touches[group->first].size();
-    for (std::uint32_t t = group->first; t < group->last; ++t) {
-      for (int i = 0; i < size; ++i) is_touched_[touches[t].point[i]] = true;
-    }
+void TouchGraph::findAreas(std::size_t first, std::size_t last) {
+  for (std::size_t g = first; g < last; ++g) {
+    const TouchGroup& group = groups_[by_partners_[g]];
+    const Index *vertex = verticesOf(group, group.first), *const end = verticesOf(group, group.last);
+    for (; vertex != end; ++vertex) is_touched_[*vertex] = true;
   }
-  const auto [low, high] = first->partners;
+  const auto [low, high] = groups_[by_partners_[first]].partners();
   findAreasOf(low);
   if (high != low && high != OBSTACLE_BODY) findAreasOf(high);
 }
 
 void TouchGraph::findAreasOf(std::size_t body) {
-  const Index begin = vertex_begin_[body], end = vertex_begin_[body + 1];
-  for (Index vertex = begin; vertex < end; ++vertex) {
-    if (!is_touched_[vertex]) continue;
+  const auto forEachTouched = [this, begin = vertex_begin_[body], end = vertex_begin_[body + 1]](const auto& f) {
+    for (Index vertex = begin; vertex < end; ++vertex) {
+      if (!is_touched_[vertex]) {  // most are not
+        const void* const next = std::memchr(is_touched_.data() + vertex, true, end - vertex);
+        if (!next) return;
+        vertex = static_cast<Index>(static_cast<const std::uint8_t*>(next) - is_touched_.data());
+      }
+      f(vertex);
+    }
+  };
+  forEachTouched([&](Index vertex) {
     Index root = area_[vertex] = vertex;
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
-      if (other > vertex) break;  // that one comes to this
       if (!is_touched_[other]) continue;
       const Index other_root = areaRoot(other);
       area_[std::max(root, other_root)] = std::min(root, other_root);
       root = std::min(root, other_root);
     }
-  }
-  for (Index vertex = begin; vertex < end; ++vertex) {
-    if (!is_touched_[vertex]) continue;
+  });
+  forEachTouched([&](Index vertex) {
     area_[vertex] = area_[area_[vertex]];  // no vertex is before the first one of its area
     is_touched_[vertex] = false;
-  }
+  });
 }
 
 /// Touches between the same two areas are one component.
-void TouchGraph::nameComponents(const std::vector<Touch>& touches, const Group* first, const Group* last) {
+void TouchGraph::nameComponents(std::size_t first, std::size_t last) {
   by_areas_.clear();
-  std::uint64_t last_areas = 0;
-  std::uint32_t component = 0;
-  for (const Group* group = first; group != last; ++group) {
-    const Touch& any = touches[group->first];
-    const int second = any.onMap() ? 0 : any.firstSize();
-    for (std::uint32_t t = group->first; t < group->last; ++t) {
-      const auto [low, high] = std::minmax(area_[touches[t].point[0]], area_[touches[t].point[second]]);
+  struct Recent {
+    std::uint64_t areas = ~std::uint64_t{0};
+    std::uint32_t component = 0;
+  };
+  std::array<Recent, 64> recent;
+  for (std::size_t g = first; g < last; ++g) {
+    const TouchGroup& group = groups_[by_partners_[g]];
+    const Index* vertex = verticesOf(group, group.first);
+    const int second = group.onMap() ? 0 : group.sizes[0];
+    std::uint64_t last_areas = ~std::uint64_t{0};  // none
+    named_of_[by_partners_[g]][0] = named_.size();
+    for (std::uint32_t t = group.first; t < group.last; ++t, vertex += group.size()) {
+      const auto [low, high] = std::minmax(area_[vertex[0]], area_[vertex[second]]);
       const std::uint64_t areas = std::uint64_t{low} << 32 | high;
-      if (by_areas_.empty() || areas != last_areas) {
-        const auto [at, is_new] = by_areas_.try_emplace(areas, component_count_);
-        component_count_ += is_new;
-        component = at->second;
-        last_areas = areas;
+      if (areas == last_areas) continue;
+      last_areas = areas;
+      Recent& one = recent[(low + 7 * high) % recent.size()];
+      if (one.areas != areas) {
+        const auto [at, is_new] = by_areas_.try_emplace(areas, patch_count_);
+        patch_count_ += is_new;
+        one = {areas, at->second};
       }
-      component_[t] = component;
+      named_.push_back({t, one.component});
     }
+    named_of_[by_partners_[g]][1] = named_.size();
   }
 }
 
-const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch>& touches) {
-  // What a burst made of the buffers in the last run is given back.
-  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
-  empty(component_, number_);
-  component_count_ = 0;
-  if (touches.empty()) return component_;  // most steps of a stream
-  component_.resize(touches.size());
-  findGroups(touches);
-  const Group* const end = groups_.data() + groups_.size();
-  for (const Group *first = groups_.data(), *last = first; first != end; first = last) {
-    last = std::find_if(first, end, [&](const Group& group) { return group.partners != first->partners; });
-    findAreas(touches, first, last);
-    nameComponents(touches, first, last);
+void TouchGraph::findPatches() {
+  if (touch_count_ == 0) return;  // most steps of a stream
+  for (std::uint32_t g = 0; g < groups_.size(); ++g) by_partners_.push_back(g);
+  std::stable_sort(by_partners_.begin(), by_partners_.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return groups_[a].partners() < groups_[b].partners(); });
+  named_of_.resize(groups_.size());
+  for (std::size_t first = 0, last = 0; first < groups_.size(); first = last) {
+    const auto partners = groups_[by_partners_[first]].partners();
+    while (last < groups_.size() && groups_[by_partners_[last]].partners() == partners) ++last;
+    findAreas(first, last);
+    nameComponents(first, last);
   }
   // In the order of their first touches.
-  number_.assign(component_count_, NO_INDEX);
+  number_.assign(patch_count_, NO_PATCH);
   std::uint32_t count = 0;
-  for (std::uint32_t& component : component_) {
-    if (number_[component] == NO_INDEX) number_[component] = count++;
-    component = number_[component];
+  for (const auto& [begin, end] : named_of_) {
+    for (std::size_t r = begin; r < end; ++r) {
+      std::uint32_t& number = number_[named_[r].patch];
+      if (number == NO_PATCH) number = count++;
+      runs_.push_back({named_[r].first, number});
+    }
   }
-  return component_;
 }
 
 }  // namespace dccd

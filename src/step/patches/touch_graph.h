@@ -1,11 +1,10 @@
 // Which touches belong together: those between the same two areas of the meshes (doc/algorithm.md, "Patches").
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
-#include <iterator>
 #include <memory>
-#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -15,77 +14,92 @@
 
 namespace dccd {
 
-/// A contact, or an edge through a face, as the graph looks at it. Vertices are numbered through all bodies.
-struct Touch {
-  // Kinds beside the values of PairKind, and the vertices of their sides.
-  static constexpr std::uint8_t CROSSING = std::size(PAIR_KINDS);
-  static constexpr std::uint8_t VERTICES = CROSSING + 1;  ///< one of each side, of something that touched
-  static constexpr std::array<std::uint8_t, 2> MORE_SIZES[] = {{2, 3}, {1, 1}};
-
-  std::array<Index, 5> point{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< the leaf's key is in the last two
+/// Touches that come one after the other, of one kind and the same two bodies.
+struct TouchGroup {
   std::array<std::uint16_t, 2> body{0, 0};
-  std::uint8_t kind = CROSSING;
-  std::uint8_t level = 0;  ///< the leaf's edge is 2^level finest voxels
-  bool initial = false;
-  bool certain = true;
-  bool expected = false;
+  std::array<std::uint8_t, 2> sizes{0, 0};  ///< vertices on each side; none of the map's
+  std::uint32_t first = 0, last = 0;        ///< its touches, as the graph numbers them
+  std::size_t vertices = 0;                 ///< where those of its first touch are
 
-  /// How many vertices are on its sides; a leaf has none.
-  int firstSize() const { return sizes()[0]; }
-  int secondSize() const { return sizes()[1]; }
-  int size() const { return firstSize() + secondSize(); }
-  const std::array<std::uint8_t, 2>& sizes() const {
-    return kind < CROSSING ? PAIR_KINDS[kind].vertices : MORE_SIZES[kind - CROSSING];
-  }
+  int size() const { return sizes[0] + sizes[1]; }
   bool onMap() const { return body[1] == OBSTACLE_BODY; }
-  VoxelKey voxel() const {
-    return {static_cast<std::uint16_t>(point[3] >> 16), static_cast<std::uint16_t>(point[3]),
-            static_cast<std::uint16_t>(point[4])};
-  }
-  auto key() const { return std::tie(kind, body, point, level); }
+  std::array<std::uint16_t, 2> partners() const { return {std::min(body[0], body[1]), std::max(body[0], body[1])}; }
 };
 
 /// Buffers are kept from run to run, and what the meshes look like as long as they stay. Not thread-safe.
 class TouchGraph {
  public:
+  /// Touches of one patch, up to the first one of the next run.
+  struct Run {
+    std::uint32_t first, patch;
+  };
+
+  /// A vertex that touches something, and one of the other side; numbered through all bodies.
+  struct Spot {
+    std::array<Index, 2> vertex{NO_INDEX, NO_INDEX};  ///< [1]: NO_INDEX with the map
+    std::array<std::uint16_t, 2> body{0, 0};          ///< partners, ascending; [1] may be OBSTACLE_BODY
+    bool expected = false;
+  };
+
   void setBodies(const std::vector<Body>& bodies);
   Index firstVertex(std::size_t body) const { return vertex_begin_[body]; }
   std::size_t vertexCount() const { return vertex_begin_.empty() ? 0 : vertex_begin_.back(); }
   std::size_t bodyCount() const { return topologies_.size(); }
   bool sameMesh(std::size_t body, const Body& now) const;
 
-  Touch touchOf(const Contact& contact) const;
-  Touch touchOf(const StartIntersection& crossing) const;
+  /// Forgets all touches.
+  void clear();
+  /// Numbered on from those before. In any order; those of one kind and the same bodies should lie together.
+  /// T: Contact, StartIntersection or Spot.
+  template <class T>
+  void add(const T* first, const T* last);
+  /// Finds to which patch each belongs. Patches are numbered in the order of their first touches.
+  void findPatches();
 
-  /// Per touch the patch that it belongs to, numbered in the order of their first touches. They may come in any order;
-  /// those of one kind and the same bodies should lie together.
-  const std::vector<std::uint32_t>& components(const std::vector<Touch>& touches);
-  std::uint32_t componentCount() const { return component_count_; }
+  std::uint32_t touchCount() const { return touch_count_; }
+  std::uint32_t patchCount() const { return patch_count_; }
+  const std::vector<TouchGroup>& groups() const { return groups_; }
+  bool isExpected(std::uint32_t touch) const { return expected_[touch]; }
+  /// group.size() of them, those of the first side first, numbered through all bodies.
+  const Index* verticesOf(const TouchGroup& group, std::uint32_t touch) const {
+    return vertices_.data() + group.vertices + (touch - group.first) * static_cast<std::size_t>(group.size());
+  }
+  /// Calls f(group, first, last, patch) for all touches in their order, as many at once as may be.
+  template <class F>
+  void forEach(const F& f) const {
+    std::size_t r = 0;
+    for (const TouchGroup& group : groups_) {
+      for (std::uint32_t t = group.first; t < group.last; ++r) {
+        const std::uint32_t last = r + 1 < runs_.size() ? runs_[r + 1].first : touch_count_;
+        f(group, t, last, runs_[r].patch);
+        t = last;
+      }
+    }
+  }
 
  private:
-  /// Touches that lie together: of one kind and the same two bodies.
-  struct Group {
-    std::array<std::uint16_t, 2> partners;  // the bodies, ascending
-    std::uint32_t first, last;
-  };
-
-  void findGroups(const std::vector<Touch>& touches);
-  void findAreas(const std::vector<Touch>& touches, const Group* first, const Group* last);
+  void findAreas(std::size_t first, std::size_t last);
   void findAreasOf(std::size_t body);
   Index areaRoot(Index vertex);
-  void nameComponents(const std::vector<Touch>& touches, const Group* first, const Group* last);
+  void nameComponents(std::size_t first, std::size_t last);
 
   std::vector<std::shared_ptr<const Topology>> topologies_;
   std::vector<Index> vertex_begin_;                           // per body, and where the last one ends
-  std::vector<std::uint32_t> neighbours_begin_, neighbours_;  // per vertex: the other ends of its edges, ascending
+  std::vector<std::uint32_t> neighbours_begin_, neighbours_;  // per vertex: the smaller ends of its edges
 
-  std::vector<Group> groups_;  // by partners
+  std::vector<TouchGroup> groups_;
+  std::vector<Index> vertices_;         // more than are used
+  std::vector<std::uint8_t> expected_;  // per touch, and more
+  std::size_t vertices_used_ = 0;
+  std::uint32_t touch_count_ = 0, patch_count_ = 0;
+  std::vector<std::uint32_t> by_partners_;  // the groups
   // Of the same two partners.
   std::vector<std::uint8_t> is_touched_;  // per vertex; between two runs none is
   std::vector<Index> area_;               // per touched vertex, one of its area: in the end the first of them
   std::unordered_map<std::uint64_t, std::uint32_t> by_areas_;
-  std::vector<std::uint32_t> component_, number_;
-  std::uint32_t component_count_ = 0;
+  std::vector<Run> named_, runs_;                     // with components for patches; in the order of touches
+  std::vector<std::array<std::size_t, 2>> named_of_;  // per group
+  std::vector<std::uint32_t> number_;                 // per component
 };
 
 }  // namespace dccd

@@ -74,7 +74,7 @@ void compare(PairKind kind, bool whole, const Kernel& kernel, const Reference& r
       for (std::size_t i = 0; i < count; ++i) {
         block->toc[i] = touches[first + i].toc;
         for (int k = 0; k < 24; ++k) {
-          block->x[k / 12][k / 3 % 4][k % 3][i] = touches[first + i].pair.x[k / 12][k / 3 % 4][k % 3];
+          block->x[k / 12][k / 3 % 4][i][k % 3] = touches[first + i].pair.x[k / 12][k / 3 % 4][k % 3];
         }
       }
       kernel(kind == PairKind::EDGE_EDGE, count, *block);

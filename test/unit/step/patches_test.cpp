@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dccd/contact_geometries.h"
 #include "oracle/oracle.h"
 #include "support/patch_oracle.h"
 #include "support/step_support.h"
@@ -119,12 +120,43 @@ TEST(Patches, AreThoseOfTheDefinitionOnCrumpledClothsAndOverAMap) {
   EXPECT_GT(contacts, 5000u);
 }
 
+/// Centroids and normals of patches between meshes, from their contacts one by one.
+void expectPlaces(const Outcome& outcome) {
+  struct Sums {
+    Vec3 points = Vec3::Zero(), normals = Vec3::Zero(), first_normal = Vec3::Zero();
+    std::size_t contacts = 0;
+  };
+  std::vector<Sums> sums(outcome.patches.size());
+  for (std::size_t c = 0; c < outcome.contacts.size(); ++c) {
+    const Contact& contact = outcome.contacts[c];
+    if (contact.body[1] == OBSTACLE_BODY) continue;
+    Vec3 x[4];
+    for (std::size_t i = 0; i < 4; ++i) x[i] = (*outcome.step->bodies[contact.bodyOf(i)].t0)[contact.vertex[i]];
+    const bool edges = contact.kind == PairKind::EDGE_EDGE;
+    Vec3 normal = (edges ? (x[1] - x[0]).cross(x[3] - x[2]) : (x[2] - x[1]).cross(x[3] - x[1])).normalized();
+    if (normal.dot(x[0] - x[edges ? 2 : 1]) < 0) normal = -normal;
+    Sums& sum = sums[outcome.patch_of[c]];
+    if (sum.contacts++ == 0) sum.first_normal = normal;
+    const bool self = contact.body[0] == contact.body[1];
+    const bool turned = self ? sum.first_normal.dot(normal) < 0 : contact.body[0] > contact.body[1];
+    sum.points += contactGeometry(outcome, contact).point;
+    sum.normals += turned ? Vec3(-normal) : normal;
+  }
+  for (std::size_t p = 0; p < sums.size(); ++p) {
+    if (sums[p].contacts == 0) continue;
+    const Patch& patch = outcome.patches[p];
+    EXPECT_LT((patch.centroid - sums[p].points / static_cast<double>(sums[p].contacts)).norm(), 1e-6) << "patch " << p;
+    EXPECT_LT((patch.normal - sums[p].normals.normalized()).norm(), 1e-6) << "patch " << p;
+  }
+}
+
 TEST(Patches, AreTheSameBitsForAnyNumberOfThreads) {
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
     Step step = crumpled(seed, 3, 40).motion();
     step.map.surface = randomMap(drawFrom(seed), 0.7);
     const Outcome one = Detector(withPatches(1)).run(step);
     ASSERT_GT(one.contacts.size(), 8192u) << "too few for more than one piece";
+    expectPlaces(one);
     for (const int threads : {2, 3}) {
       EXPECT_EQ(patchDifference(one, Detector(withPatches(threads)).run(step)), "") << threads << " threads";
     }
