@@ -85,6 +85,11 @@ class Unfolded::Search {
     return part_count_;
   }
 
+  bool holdsMost() const {
+    const auto in_none = std::count(parts_of_.begin(), parts_of_.end(), std::uint64_t{0});
+    return 2 * static_cast<std::size_t>(in_none) < parts_of_.size();
+  }
+
   void markGroups(const SceneBody& body, FeatureKind kind, std::vector<std::vector<std::uint64_t>>& levels) const {
     const std::size_t clusters = (body.tree(kind).featureCount() + GROUP - 1) / GROUP;
     for (std::size_t g = 0; g < clusters; ++g) {
@@ -369,6 +374,7 @@ void Unfolded::run(const SceneBody& body, const VertexMotion* vertices, const Pa
   if (!search_) return;
   part_count_ = search_->run(body, vertices, parallel, whole_);
   if (part_count_ == 0) return;
+  holds_most_ = search_->holdsMost();
   for (const FeatureKind kind : {FeatureKind::VERTEX, FeatureKind::EDGE, FeatureKind::FACE}) {
     std::vector<std::vector<std::uint64_t>>& levels = parts_[static_cast<int>(kind)].levels_;
     if (!whole_) search_->markGroups(body, kind, levels);

@@ -65,6 +65,8 @@ class Unfolded {
   /// The whole body is one part.
   bool isWhole() const { return part_count_ > 0 && whole_; }
   std::size_t partCount() const { return part_count_; }
+  /// Most of it is in parts.
+  bool holdsMost() const { return part_count_ > 0 && holds_most_; }
   /// Of the body's tree; null: nothing is left out.
   const PartsOfGroups* parts(FeatureKind kind) const {
     return part_count_ > 0 ? &parts_[static_cast<int>(kind)] : nullptr;
@@ -74,7 +76,7 @@ class Unfolded {
   class Search;
   std::unique_ptr<Search> search_;  // null: no surface, or not one that meets itself
   std::size_t part_count_ = 0;
-  bool whole_ = false;
+  bool whole_ = false, holds_most_ = false;
   PartsOfGroups parts_[3];  // by FeatureKind
 };
 

@@ -358,7 +358,9 @@ bool History::Impl::fill(const Part& part) {
   }
   // A single body that does not meet itself is tested against the map alone, which has bounds of its own.
   const bool any = std::find(bounded.begin(), bounded.end(), 1) != bounded.end();
-  if (any || bounded.size() > 1) scene.refit(inPieces, stats, bounded);
+  std::vector<std::uint8_t> leaves_wait;
+  for (const Unfolded& surface : unfolded) leaves_wait.push_back(surface.holdsMost());
+  if (any || bounded.size() > 1) scene.refit(inPieces, stats, bounded, leaves_wait);
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;
 }
