@@ -48,6 +48,18 @@ TEST(UnfoldedParts, OnlyAFoldIsLookedAt) {
   EXPECT_LT(2 * culled.stats[Stage::BROAD_PHASE].in, all.stats[Stage::BROAD_PHASE].in);
 }
 
+TEST(UnfoldedParts, AGloveIsFoundOutInSomeSteps) {
+  const test::Glove glove(160);
+  const Step step = stepOf(glove.topology, glove.curled(0.3), glove.curled(0.33));
+  Options options;
+  options.check_start_state = false;
+  test::Detector stream(options);
+  Outcome culled;
+  for (int i = 0; i < 25; ++i) culled = stream.run(step);
+  EXPECT_GE(culled.stats.unfolded_parts, 2u) << "its palm and its back";
+  EXPECT_LT(4 * culled.stats[Stage::BROAD_PHASE].in, runStep(step, false).stats[Stage::BROAD_PHASE].in);
+}
+
 // The bounds of leaves are made where they are asked for, some of them after others have been shortened. As all of it
 // moves on, too, bounds of different times are apart.
 TEST(UnfoldedParts, TheFirstContactIsTheSame) {
