@@ -72,6 +72,10 @@ class ClusterPairStream {
       const std::size_t met = clusters;
       clusters = trees.leaveOut(0, clusters_.data(), met);
       cluster_pairs_left_out_ += met - clusters;
+      for (std::size_t i = 0; i < clusters; ++i) {
+        trees.a->needLeaves(clusters_[2 * i]);
+        trees.b->needLeaves(clusters_[2 * i + 1]);
+      }
       std::size_t leaf_done = 0;
       while (leaf_done < clusters) {
         const std::uint32_t* from = clusters_.data() + 2 * leaf_done;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <thread>
 
 namespace dccd {
 namespace {
@@ -113,6 +114,31 @@ void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* m
                     levels_[0].soa.data() + first_group * SOA_SIZE, levels_[0].aos.data() + first_group * AOS_SIZE);
 }
 
+void ClusterTree::letLeavesWait(bool wait, const std::int16_t* records) {
+  leaves_wait_ = wait;
+  if (!wait) return;
+  records_ = records;
+  if (made_.size() != levels_[0].groups) made_ = std::vector<std::atomic<std::uint8_t>>(levels_[0].groups);
+}
+
+void ClusterTree::refitGroups(std::size_t first_group, std::size_t last_group) {
+  simd::boundGroups(records_, boundedGroup(first_group), arity_, (last_group - first_group) * GROUP,
+                    levels_[0].aos.data() + first_group * AOS_SIZE);
+  for (std::size_t g = first_group; g < last_group; ++g) made_[g].store(WAITS, std::memory_order_relaxed);
+}
+
+void ClusterTree::makeLeaves(std::size_t group) const {
+  std::atomic<std::uint8_t>& made = made_[group];
+  std::uint8_t waits = WAITS;
+  if (!made.compare_exchange_strong(waits, IS_BEING_MADE, std::memory_order_acquire)) {
+    while (made.load(std::memory_order_acquire) != MADE) std::this_thread::yield();
+    return;
+  }
+  simd::buildLeaves(records_, boundedGroup(group), arity_, GROUP, nullptr, levels_[0].soa.data() + group * SOA_SIZE,
+                    levels_[0].aos.data() + group * AOS_SIZE);
+  made.store(MADE, std::memory_order_release);
+}
+
 void ClusterTree::refitUpper() {
   for (std::size_t l = 1; l < levels_.size(); ++l) {
     simd::buildUpper(levels_[l - 1].aos.data(), levels_[l - 1].groups, levels_[l].soa.data(), levels_[l].aos.data());
@@ -121,6 +147,7 @@ void ClusterTree::refitUpper() {
 
 void ClusterTree::shorten(std::size_t level, std::int32_t end, bool swept, std::size_t first_group,
                           std::size_t last_group) {
+  for (std::size_t g = first_group; level == 0 && g < last_group; ++g) needLeaves(g);
   Level& of = levels_[level];
   simd::shortenBounds(of.soa.data() + first_group * simd::SOA_SIZE, of.aos.data() + first_group * simd::AOS_SIZE,
                       last_group - first_group, end, swept);

@@ -3,6 +3,7 @@
 // t0 and at t1, which is tighter than a DOP of the swept volume (two slabs that only pass each other stay apart).
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -62,7 +63,15 @@ class ClusterTree {
   /// Recomputes all bounds from the vertices' records. margin16: see simd::buildLeaves.
   void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
                    std::size_t last_group);
+  /// Before a refit. wait: refitGroups() follows in the place of refitLeaves(), and needLeaves() makes the leaves of
+  /// those groups that are asked for, from the same records, without margins.
+  void letLeavesWait(bool wait, const std::int16_t* records);
+  void refitGroups(std::size_t first_group, std::size_t last_group);
   void refitUpper();
+  /// Before a group of leaves is looked at. Of any number of threads one makes them, and the others wait for it.
+  void needLeaves(std::size_t group) const {
+    if (leaves_wait_ && made_[group].load(std::memory_order_acquire) != MADE) makeLeaves(group);
+  }
   /// simd::shortenBounds() of the groups of a level.
   void shorten(std::size_t level, std::int32_t end, bool swept, std::size_t first_group, std::size_t last_group);
 
@@ -92,12 +101,18 @@ class ClusterTree {
   }
 
  private:
+  static constexpr std::uint8_t WAITS = 0, IS_BEING_MADE = 1, MADE = 2;
+  void makeLeaves(std::size_t group) const;
+
   std::size_t feature_count_ = 0;
   std::size_t arity_ = 1;
   std::vector<Index> features_;               // slots x arity, empty ones NO_INDEX
   hwy::AlignedFreeUniquePtr<Index[]> lanes_;  // features_ group by group, a vertex of each lane after another
   std::vector<Index> masked_;                 // the same with left-out ones NO_INDEX; empty when nothing is left out
-  std::vector<Level> levels_;
+  mutable std::vector<Level> levels_;         // that of leaves is made when it is asked for
+  bool leaves_wait_ = false;                  // some of them may, for
+  const std::int16_t* records_ = nullptr;
+  mutable std::vector<std::atomic<std::uint8_t>> made_;  // per group of leaves
 };
 
 }  // namespace dccd

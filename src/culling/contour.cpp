@@ -48,12 +48,17 @@ double PlanarSpan::productError() const {
 Contour::Contour(Index first_vertex, std::size_t vertex_count)
     : first_vertex_(first_vertex), corner_of_(vertex_count, NONE) {}
 
-bool Contour::Span::isApartFrom(const Span& other, double margin) const {
+/// Along some direction, one is above the other at both times.
+bool Contour::areApart(const Ends& a, const Ends& b, double margin) const {
+  const auto isAbove = [margin](const Corner*(&above)[2], const Corner*(&below)[2], std::size_t d) {
+    return std::min(above[0]->projections[d], above[1]->projections[d]) >
+           std::max(below[0]->projections[d], below[1]->projections[d]) + margin;
+  };
+  const Corner *one[2] = {&corners_[a.from], &corners_[a.to]}, *other[2] = {&corners_[b.from], &corners_[b.to]};
   for (std::size_t d = 0; d < DIRECTIONS; ++d) {
     const std::size_t e = d + DIRECTIONS;
-    const bool above = low[d] > other.high[d] + margin && low[e] > other.high[e] + margin;
-    const bool below = other.low[d] > high[d] + margin && other.low[e] > high[e] + margin;
-    if (above | below) return true;
+    if (isAbove(one, other, d) && isAbove(one, other, e)) return true;
+    if (isAbove(other, one, d) && isAbove(other, one, e)) return true;
   }
   return false;
 }
@@ -182,35 +187,33 @@ bool Contour::testSweep() {
       corner.projections[d + DIRECTIONS] = PLANE.c[d] * p.x1 + PLANE.s[d] * p.y1;
     }
   }
-  const std::size_t along = widestDirection(), late = along + DIRECTIONS;
+  const std::size_t along = widestDirection(), across = (along + DIRECTIONS / 2) % DIRECTIONS;
   swept_.clear();
   for (std::uint32_t s = 0; s < ends_.size(); ++s) {
     const auto &a = corners_[ends_[s].from].projections, &b = corners_[ends_[s].to].projections;
-    swept_.push_back({std::min(std::min(a[along], a[late]), std::min(b[along], b[late])),
-                      std::max(std::max(a[along], a[late]), std::max(b[along], b[late])), s});
+    const auto low = [&](std::size_t d) {
+      return std::min(std::min(a[d], a[d + DIRECTIONS]), std::min(b[d], b[d + DIRECTIONS]));
+    };
+    const auto high = [&](std::size_t d) {
+      return std::max(std::max(a[d], a[d + DIRECTIONS]), std::max(b[d], b[d + DIRECTIONS]));
+    };
+    swept_.push_back({low(along), high(along), low(across), high(across), s});
   }
   std::sort(swept_.begin(), swept_.end(),
             [](const Swept& a, const Swept& b) { return a.low != b.low ? a.low < b.low : a.side < b.side; });
-  spans_.resize(swept_.size());
-  for (std::size_t i = 0; i < swept_.size(); ++i) {
-    const Ends& ends = ends_[swept_[i].side];
-    const auto &a = corners_[ends.from].projections, &b = corners_[ends.to].projections;
-    for (std::size_t d = 0; d < 2 * DIRECTIONS; ++d) {
-      spans_[i].low[d] = std::min(a[d], b[d]);
-      spans_[i].high[d] = std::max(a[d], b[d]);
-    }
-    spans_[i].side = swept_[i].side;
-  }
   // A projection is off by sqrt(2) error for its point's coordinates and below 2 error for its own roundings; two meet.
   const double margin = 8 * error_;
   std::size_t budget = SWEEP_FACTOR * swept_.size();
   for (std::size_t i = 0; i < swept_.size(); ++i) {
     for (std::size_t j = i + 1; j < swept_.size() && swept_[j].low <= swept_[i].high + margin; ++j) {
       if (budget-- == 0) return false;
-      if (spans_[i].isApartFrom(spans_[j], margin)) continue;
-      const Ends &a = ends_[spans_[i].side], &b = ends_[spans_[j].side];
+      // Most are, and side by side in memory.
+      const bool beside = swept_[i].across_low > swept_[j].across_high + margin ||
+                          swept_[j].across_low > swept_[i].across_high + margin;
+      if (beside) continue;
+      const Ends &a = ends_[swept_[i].side], &b = ends_[swept_[j].side];
       const bool share = (a.from == b.from) | (a.from == b.to) | (a.to == b.from) | (a.to == b.to);
-      if (!share) bad_[spans_[i].side] = bad_[spans_[j].side] = 1;
+      if (!share && !areApart(a, b, margin)) bad_[swept_[i].side] = bad_[swept_[j].side] = 1;
     }
   }
   return true;

@@ -87,15 +87,9 @@ class Contour {
     std::uint32_t from, to;           ///< corners
     std::uint32_t next_out, next_in;  ///< sides with the same one
   };
-  /// An edge, projected on the directions.
-  struct Span {
-    std::array<double, 2 * DIRECTIONS> low, high;
-    std::uint32_t side;
-
-    bool isApartFrom(const Span& other, double margin) const;
-  };
+  /// A side and what it sweeps, along a direction and across it.
   struct Swept {
-    double low, high;
+    double low, high, across_low, across_high;
     std::uint32_t side;
   };
 
@@ -103,6 +97,7 @@ class Contour {
   void findCycles();
   void testVertices();
   std::size_t widestDirection() const;
+  bool areApart(const Ends& a, const Ends& b, double margin) const;
   bool testSweep();
   void testOrientation();
   bool turnsAt(const PlanarSpan::Point& before, const PlanarSpan::Point& at, const PlanarSpan::Point& after) const;
@@ -114,7 +109,6 @@ class Contour {
   std::vector<std::uint32_t> cycles_, cycle_begin_;  // sides, cycle by cycle
   std::vector<std::uint32_t> path_;
   std::vector<Swept> swept_;
-  std::vector<Span> spans_;  // in the order of the sweep
   std::vector<std::uint8_t> bad_;
   double error_ = 0, product_error_ = 0;
 };

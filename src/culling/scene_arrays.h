@@ -113,9 +113,11 @@ class SceneArrays {
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
 
   /// Records and bounds of every body that is neither kept nor far. needed: per body, whether it has bounds however far
-  /// it is; empty: all. pieces(n, f): calls f(first, last) over [0, n), in parallel or not.
+  /// it is; empty: all. leaves_wait: per body, whether few of its leaves will be asked for (ClusterTree::needLeaves());
+  /// empty: of none. pieces(n, f): calls f(first, last) over [0, n), in parallel or not.
   template <class Pieces>
-  void refit(const Pieces& pieces, StepStats& stats, const std::vector<std::uint8_t>& needed = {}) {
+  void refit(const Pieces& pieces, StepStats& stats, const std::vector<std::uint8_t>& needed = {},
+             const std::vector<std::uint8_t>& leaves_wait = {}) {
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       SceneBody& body = bodies_[b];
       body.far = body.passed_by || (!needed.empty() && !needed[b] && isFar(b));
@@ -126,9 +128,12 @@ class SceneArrays {
       pieces(body.usedCount(), [&](std::size_t first, std::size_t last) {
         quantize(body.internal_begin + first, body.internal_begin + last);
       });
+      const bool wait = !leaves_wait.empty() && leaves_wait[b] && !body.uncertain && body.reach_m == 0;
       for (ClusterTree& tree : body.trees) {
-        pieces(tree.level(0).groups,
-               [&](std::size_t first, std::size_t last) { refitLeaves(body, tree, first, last); });
+        tree.letLeavesWait(wait, records_.data());
+        pieces(tree.level(0).groups, [&](std::size_t first, std::size_t last) {
+          wait ? tree.refitGroups(first, last) : refitLeaves(body, tree, first, last);
+        });
         tree.refitUpper();
       }
     }

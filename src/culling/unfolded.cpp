@@ -19,7 +19,12 @@ constexpr std::size_t SAMPLES = 256;           // faces that give the mean norma
 constexpr std::size_t FEWEST_CELLS = 16;       // of a part of a surface
 constexpr std::size_t PAIRS_A_DIRECTION = 32;  // one in so many of the cells beside each other are worth a direction
 constexpr std::size_t LEAST_BUDGET = 4096;     // edges of borders that are tested in a run, or one for each cell
-constexpr std::size_t TRIES = 8;               // of a part whose border meets itself
+constexpr std::size_t FIRST_BUDGET = 4;        // times as much in the first run
+constexpr std::size_t TRIES = 8;               // of a part whose border meets itself, in one run or in several
+constexpr std::size_t TRIES_BY_CELLS = 3;      // after which the cells around those that stand against it go, too
+constexpr std::size_t RUNS_TO_FINISH = 5;      // that end with their budget and certify next to nothing
+constexpr std::size_t MOST_IN_NONE = 6;    // one in so many clusters of edges, of a surface of which most is in parts
+constexpr std::size_t LONG_BORDER = 1024;  // edges
 constexpr std::size_t CELLS_A_PIECE = 256, CELLS_AT_ONCE = 32;
 constexpr std::uint32_t ALL_VIEWS = (1u << simd::VIEWS) - 1;
 
@@ -76,7 +81,8 @@ class Unfolded::Search {
       return 0;
     }
     std::fill(parts_of_.begin(), parts_of_.end(), 0);
-    budget_ = std::max(LEAST_BUDGET, cells_.count());
+    budget_ = std::max(LEAST_BUDGET, cells_.count()) * (is_first_run_ ? FIRST_BUDGET : 1);
+    is_first_run_ = false;
     rest();
     findViews(body.tree(FeatureKind::FACE), parallel);
     const bool one = certifyMost();
@@ -104,32 +110,48 @@ class Unfolded::Search {
   bool areTogether(std::uint32_t a, std::uint32_t b) const { return (parts_of_[a] & parts_of_[b]) != 0; }
   bool isMarked(std::uint32_t cell) const { return marks_[cell] == mark_; }
 
-  /// What stood against a part is left out of the same view for some runs, and so is a view without a part.
+  /// What a direction remembers of the runs before.
+  struct View {
+    std::size_t rests = 0;               // runs that it is left out of
+    std::vector<std::uint32_t> dropped;  // cells that stood against a part,
+    std::size_t kept = 0;                // for so many runs
+    std::size_t tries = 0;               // since a part was certified, and
+    std::size_t stood_against = 0;       // cells in the last of them
+    bool holds = false;                  // a part, as of the last run that asked for one
+  };
+
+  /// What stood against a part is left out of the same view for some runs, for more where that gave a part; and a view
+  /// without a part is left out.
   void rest() {
     allowed_ = ALL_VIEWS;
     for (std::size_t v = 0; v < simd::VIEWS; ++v) {
-      if (resting_[v] > 0 && --resting_[v] > 0) allowed_ &= ~(1u << v);
-      if (++runs_with_[v] <= RUNS_LEFT_OUT) continue;
-      runs_with_[v] = 0;
-      dropped_[v].clear();
+      View& view = per_view_[v];
+      if (view.rests > 0 && --view.rests > 0) allowed_ &= ~(1u << v);
+      if (++view.kept <= (view.holds ? MOST_LEFT_OUT : RUNS_LEFT_OUT)) continue;
+      view.kept = 0;
+      view.dropped.clear();
     }
   }
   /// Of the cells that are not dropped.
-  void certifyAlong(std::size_t view, std::vector<std::uint32_t>& cells) {
-    if (!dropped_[view].empty()) {
-      mark(dropped_[view]);
+  void certifyAlong(std::size_t direction, std::vector<std::uint32_t>& cells) {
+    View& view = per_view_[direction];
+    if (!view.dropped.empty()) {
+      mark(view.dropped);
       cells.erase(std::remove_if(cells.begin(), cells.end(), [&](std::uint32_t c) { return isMarked(c); }),
                   cells.end());
     }
     const std::size_t before = part_count_;
     if (cells.size() == cells_.count()) {
-      certifyPart(cells, planeOf(view), &dropped_[view]);
+      certifyPart(cells, planeOf(direction), &view);
     } else {
       for (std::vector<std::uint32_t>& component : componentsOf(cells)) {
-        if (part_count_ < MOST_PARTS) certifyPart(std::move(component), planeOf(view), &dropped_[view]);
+        if (part_count_ < MOST_PARTS) certifyPart(std::move(component), planeOf(direction), &view);
       }
     }
-    if (part_count_ == before && budget_ > 0) resting_[view] = RUNS_LEFT_OUT + 1;
+    view.holds = part_count_ > before;
+    const bool hopeless = view.tries >= TRIES;
+    if (!view.holds && (budget_ > 0 || hopeless)) view.rests = RUNS_LEFT_OUT + 1;
+    if (view.holds || view.rests > 0) view.tries = view.stood_against = 0;
   }
 
   /// Views of each cell that all its faces face.
@@ -156,16 +178,26 @@ class Unfolded::Search {
     return can;
   }
 
+  /// The view that most count for, of cells or of pairs of them: one that held a part in the run before is worth a
+  /// third more, but not more than all cells.
+  std::size_t bestOf(const std::array<std::size_t, simd::VIEWS>& counts) const {
+    const auto worth = [&](std::size_t v) {
+      return counts[v] == cells_.count() ? 4 * counts[v] : counts[v] * (per_view_[v].holds ? 4 : 3);
+    };
+    std::size_t best = 0;
+    for (std::size_t v = 1; v < simd::VIEWS; ++v) best = worth(v) > worth(best) ? v : best;
+    return best;
+  }
+
   /// Along the direction that most cells face. True: it holds all of them.
   bool certifyMost() {
     std::array<std::size_t, simd::VIEWS> counts{};
     for (const std::uint32_t views : views_) {
       for (std::uint32_t v = views & allowed_; v != 0; v &= v - 1) ++counts[static_cast<std::size_t>(__builtin_ctz(v))];
     }
-    const auto most = std::max_element(counts.begin(), counts.end());
-    if (*most < std::min(FEWEST_CELLS, cells_.count())) return false;
+    first_view_ = bestOf(counts);
+    if (counts[first_view_] < std::min(FEWEST_CELLS, cells_.count())) return false;
     std::vector<std::uint32_t> cells;
-    first_view_ = static_cast<std::size_t>(most - counts.begin());
     for (std::uint32_t c = 0; c < cells_.count(); ++c) {
       if ((views_[c] >> first_view_ & 1) != 0) cells.push_back(c);
     }
@@ -237,9 +269,8 @@ class Unfolded::Search {
           counts[static_cast<std::size_t>(__builtin_ctz(v))] += stride;
         }
       }
-      const auto most = std::max_element(counts.begin(), counts.end());
-      if (*most < fewest) break;
-      const auto view = static_cast<std::size_t>(most - counts.begin());
+      const std::size_t view = bestOf(counts);
+      if (counts[view] < fewest) break;
       left &= ~(1u << view);
       cells.clear();
       mark(cells);
@@ -256,6 +287,8 @@ class Unfolded::Search {
                   open_.end());
     }
     const bool hardly_any = (all - open_.size()) * FEW < all;
+    unfinished_ = hardly_any && budget_ == 0 ? unfinished_ + 1 : 0;
+    if (unfinished_ > 0 && unfinished_ % RUNS_TO_FINISH != 0) return;
     if (hardly_any) left_out_runs_ = next_left_out_;
     next_left_out_ = hardly_any ? std::min(2 * next_left_out_ + 1, MOST_LEFT_OUT) : RUNS_LEFT_OUT;
   }
@@ -293,8 +326,7 @@ class Unfolded::Search {
   }
 
   /// The number of cells of the part; 0: there is none.
-  std::size_t certifyPart(std::vector<std::uint32_t> cells, const ViewPlane& plane,
-                          std::vector<std::uint32_t>* dropped) {
+  std::size_t certifyPart(std::vector<std::uint32_t> cells, const ViewPlane& plane, View* view) {
     for (std::size_t i = 0; i < TRIES; ++i) {
       mark(cells);
       border_.clear();
@@ -310,18 +342,37 @@ class Unfolded::Search {
           border_cell_.resize(border_.size(), c);
         }
       }
-      // A pair of cells saves about what two edges of the border take.
-      if (cells.size() < cells_.count() && 2 * won < border_.size()) return 0;
+      // A pair of cells saves about what two edges of the border take; those of a long one meet more others in a sweep.
+      const bool is_long = border_.size() > LONG_BORDER;
+      if (cells.size() < cells_.count() && 4 * won < (is_long ? 5 : 2) * border_.size()) return 0;
       if (!canPay(border_.size())) return 0;
+      if (view) ++view->tries;
       if (contour_.isSimple(border_, plane, vertices_)) {
         for (const std::uint32_t c : cells) parts_of_[c] |= std::uint64_t{1} << part_count_;
         ++part_count_;
         return cells.size();
       }
+      bad_cells_.clear();
       for (std::size_t s = 0; s < border_.size(); ++s) {
         if (!contour_.bad()[s] || marks_[border_cell_[s]] == 0) continue;
         marks_[border_cell_[s]] = 0;
-        if (dropped) dropped->push_back(border_cell_[s]);
+        bad_cells_.push_back(border_cell_[s]);
+      }
+      if (view && view->tries > TRIES_BY_CELLS) {
+        for (std::size_t b = 0, last = bad_cells_.size(); b < last; ++b) {
+          for (auto n = cells_.firstNeighbour(bad_cells_[b]); n != cells_.lastNeighbour(bad_cells_[b]); ++n) {
+            if (n->cell == SurfaceCells::BORDER || !isMarked(n->cell)) continue;
+            marks_[n->cell] = 0;
+            bad_cells_.push_back(n->cell);
+          }
+        }
+      }
+      if (view) {
+        view->dropped.insert(view->dropped.end(), bad_cells_.begin(), bad_cells_.end());
+        const bool too_many = view->stood_against > 0 && 4 * bad_cells_.size() > view->stood_against;
+        view->stood_against = bad_cells_.size();
+        if (too_many && bad_cells_.size() > FEWEST_CELLS) view->tries = TRIES;
+        if (view->tries >= TRIES) return 0;
       }
       cells.erase(std::remove_if(cells.begin(), cells.end(), [&](std::uint32_t c) { return !isMarked(c); }),
                   cells.end());
@@ -338,8 +389,9 @@ class Unfolded::Search {
   const VertexMotion* vertices_ = nullptr;
   std::size_t part_count_ = 0, left_out_runs_ = 0, first_view_ = 0, budget_ = 0, next_left_out_ = RUNS_LEFT_OUT;
   std::uint32_t allowed_ = ALL_VIEWS;
-  std::array<std::size_t, simd::VIEWS> resting_{}, runs_with_{};  // runs: left out of them; with what is dropped
-  std::array<std::vector<std::uint32_t>, simd::VIEWS> dropped_;   // cells
+  std::array<View, simd::VIEWS> per_view_;
+  bool is_first_run_ = true;
+  std::size_t unfinished_ = 0;  // runs one after another
   Vec3 normal_;
   std::vector<PlanarSpan::Point> points_;  // per used vertex
   std::vector<std::uint64_t> parts_of_;    // per cell: a bit for each part that holds it
@@ -347,7 +399,7 @@ class Unfolded::Search {
   std::vector<std::uint64_t> marks_;       // per cell
   std::uint64_t mark_ = 0;
   std::vector<Contour::Side> border_;
-  std::vector<std::uint32_t> border_cell_;
+  std::vector<std::uint32_t> border_cell_, bad_cells_;
   std::vector<std::array<std::uint32_t, 2>> open_;  // cells beside each other that no part holds
 };
 
@@ -376,6 +428,9 @@ void Unfolded::run(const SceneBody& body, const VertexMotion* vertices, const Pa
       if (whole_) std::fill(level.begin(), level.end(), 1);
     }
   }
+  const std::vector<std::uint64_t>& edges = parts_[static_cast<int>(FeatureKind::EDGE)].levels_[0];
+  const auto in_none = static_cast<std::size_t>(std::count(edges.begin(), edges.end(), std::uint64_t{0}));
+  holds_most_ = MOST_IN_NONE * in_none < edges.size();
 }
 
 }  // namespace dccd

@@ -44,8 +44,9 @@ std::size_t leaveOutPairs(const PartsOfGroups& a, const PartsOfGroups& b, std::s
 /// Parts are sets of cells, seen along 24 fixed directions, one after another, as long as that pays: first all that are
 /// seen from their front along the direction for which they are most, which may be the whole surface; then those that
 /// lie beside each other in no part yet, and those around them. A part whose border meets itself is tried again without
-/// the cells at such places. Where a part is not the whole, but the surface may be seen along its mean normal, that is
-/// tried, too. Two clusters of features are left out where one part holds both.
+/// the cells at such places, in the next runs, too. Directions that held a part in the last run come first. Where a
+/// part is not the whole, but the surface may be seen along its mean normal, that is tried, too. Two clusters of
+/// features are left out where one part holds both.
 class Unfolded {
  public:
   using Parallel =
@@ -65,6 +66,8 @@ class Unfolded {
   /// The whole body is one part.
   bool isWhole() const { return part_count_ > 0 && whole_; }
   std::size_t partCount() const { return part_count_; }
+  /// Most of it is in parts.
+  bool holdsMost() const { return part_count_ > 0 && holds_most_; }
   /// Of the body's tree; null: nothing is left out.
   const PartsOfGroups* parts(FeatureKind kind) const {
     return part_count_ > 0 ? &parts_[static_cast<int>(kind)] : nullptr;
@@ -74,7 +77,7 @@ class Unfolded {
   class Search;
   std::unique_ptr<Search> search_;  // null: no surface, or not one that meets itself
   std::size_t part_count_ = 0;
-  bool whole_ = false;
+  bool whole_ = false, holds_most_ = false;
   PartsOfGroups parts_[3];  // by FeatureKind
 };
 

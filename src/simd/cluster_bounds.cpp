@@ -16,39 +16,77 @@ namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+using Ends = hn::CappedTag<double, 8>;
+using EndValues = hn::Vec<Ends>;
+
+/// Projections of as many points as there are lanes.
+HWY_INLINE void projectLanes(const double* HWY_RESTRICT points, EndValues* HWY_RESTRICT p) {
+  EndValues unused;
+  hn::LoadInterleaved4(Ends(), points, p[0], p[1], p[2], unused);
+  p[3] = hn::Add(p[0], p[1]);
+  p[4] = hn::Add(p[0], p[2]);
+  p[5] = hn::Add(p[1], p[2]);
+  p[6] = hn::Sub(p[0], p[1]);
+  p[7] = hn::Sub(p[1], p[2]);
+}
+
+/// Calls f(points, i) for points from the i-th on, in blocks of as many as there are lanes: the last block may begin
+/// before the one before it ends. Of fewer points than that the last one is there several times.
+template <class F>
+HWY_INLINE void forEachBlock(const double* HWY_RESTRICT vertices, size_t points, const F& f) {
+  if (points == 0) return;
+  const size_t lanes = hn::Lanes(Ends());
+  HWY_ALIGN double few[4 * 8];
+  for (size_t i = 0; points < lanes && i < lanes; ++i) {
+    std::copy_n(vertices + 4 * std::min(i, points - 1), 4, few + 4 * i);
+  }
+  for (size_t i = 0; i < points; i += lanes) {
+    const size_t first = points < lanes ? 0 : std::min(i, points - lanes);
+    f(points < lanes ? few : vertices + 4 * first, first);
+  }
+}
+
 void ProjectionBounds(const double* HWY_RESTRICT vertices, size_t n, double* HWY_RESTRICT min8,
                       double* HWY_RESTRICT max8) {
-  double lo[8], hi[8], p[8];
-  std::copy(min8, min8 + 8, lo);
-  std::copy(max8, max8 + 8, hi);
-  for (size_t i = 0; i < 2 * n; ++i) {
-    project(vertices + 4 * i, p);
-    for (int d = 0; d < 8; ++d) {
-      lo[d] = p[d] < lo[d] ? p[d] : lo[d];
-      hi[d] = p[d] > hi[d] ? p[d] : hi[d];
-    }
+  const Ends d;
+  EndValues lo[DIRECTIONS], hi[DIRECTIONS];
+  for (size_t k = 0; k < DIRECTIONS; ++k) lo[k] = hn::Set(d, min8[k]), hi[k] = hn::Set(d, max8[k]);
+  forEachBlock(vertices, 2 * n, [&](const double* HWY_RESTRICT points, size_t) HWY_ATTR {
+    EndValues p[DIRECTIONS];
+    projectLanes(points, p);
+    for (size_t k = 0; k < DIRECTIONS; ++k) lo[k] = hn::Min(p[k], lo[k]), hi[k] = hn::Max(p[k], hi[k]);
+  });
+  for (size_t k = 0; k < DIRECTIONS; ++k) {
+    min8[k] = hn::GetLane(hn::MinOfLanes(d, lo[k]));
+    max8[k] = hn::GetLane(hn::MaxOfLanes(d, hi[k]));
   }
-  std::copy(lo, lo + 8, min8);
-  std::copy(hi, hi + 8, max8);
 }
 
 void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_RESTRICT low8,
               const double* HWY_RESTRICT scale8, int16_t* HWY_RESTRICT records) {
-  const hn::CappedTag<double, 8> dd;
-  const hn::Rebind<int32_t, decltype(dd)> di;
-  HWY_ALIGN double p[8];
-  HWY_ALIGN int32_t q[8];
-  for (size_t i = 0; i < 2 * n; ++i) {
-    project(vertices + 4 * i, p);
-    for (size_t d = 0; d < 8; d += hn::Lanes(dd)) {
-      const auto value = hn::Mul(hn::Sub(hn::Load(dd, p + d), hn::LoadU(dd, low8 + d)), hn::LoadU(dd, scale8 + d));
+  const Ends d;
+  const hn::Rebind<int32_t, Ends> di;
+  // Two directions in 32 bits, so that those of a point come to lie side by side.
+  forEachBlock(vertices, 2 * n, [&](const double* HWY_RESTRICT points, size_t first) HWY_ATTR {
+    EndValues p[DIRECTIONS];
+    projectLanes(points, p);
+    const auto record = [&](size_t k) HWY_ATTR {
+      const auto value = hn::Mul(hn::Sub(p[k], hn::Set(d, low8[k])), hn::Set(d, scale8[k]));
       // A sum that overflowed meets a scale of 0 only; the direction then says nothing about any vertex. What lies
       // outside the range (a body without any active vertex) takes its end, which keeps the order, too.
-      const auto number = hn::IfThenElseZero(hn::Eq(value, value), value);
-      hn::Store(hn::DemoteTo(di, hn::Clamp(number, hn::Zero(dd), hn::Set(dd, RECORD_RANGE))), di, q + d);
-    }
-    for (int d = 0; d < 8; ++d) records[8 * i + d] = static_cast<int16_t>(q[d] - 32764);
-  }
+      const auto whole = hn::DemoteTo(di, hn::IfThenElseZero(hn::Gt(hn::Set(d, scale8[k]), hn::Zero(d)), value));
+      return hn::Sub(hn::Clamp(whole, hn::Zero(di), hn::Set(di, static_cast<int32_t>(RECORD_RANGE))),
+                     hn::Set(di, 32764));
+    };
+    const auto two = [&](size_t k) HWY_ATTR {
+      return hn::Or(hn::And(record(k), hn::Set(di, 0xffff)), hn::ShiftLeft<16>(record(k + 1)));
+    };
+    const size_t lanes = hn::Lanes(d), count = std::min(lanes, 2 * n);
+    HWY_ALIGN int32_t last[4 * 8];
+    int32_t* const to = count < lanes ? last : reinterpret_cast<int32_t*>(records + DIRECTIONS * first);
+    hn::StoreInterleaved4(two(0), two(2), two(4), two(6), di, to);
+    if (count < lanes) std::memcpy(records, last, count * DIRECTIONS * sizeof(int16_t));
+  });
 }
 
 // rows: 16 rows of 16 values. A lane's two neighbouring directions stay side by side (soaIndex()).
@@ -139,6 +177,38 @@ void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRI
   }
 }
 
+template <size_t ARITY>
+HWY_INLINE void boundGroups(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t count,
+                            int16_t* HWY_RESTRICT aos) {
+  const D16 d;
+  for (const uint32_t* end = indices + count * ARITY; indices != end; indices += GROUP * ARITY, aos += AOS_SIZE) {
+    for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
+      // Of every other feature, so that half of the comparisons do not wait for the other half.
+      auto small = hn::Set(d, EMPTY_LO), large = hn::Set(d, EMPTY_HI), other_small = small, other_large = large;
+      const auto add = [&](const uint32_t* f, hn::Vec<D16>& lo, hn::Vec<D16>& hi) HWY_ATTR {
+        for (size_t j = 0; f[0] != UINT32_MAX && j < ARITY; ++j) {
+          const auto r = hn::LoadU(d, records + RECORD * size_t{f[j]} + k);
+          lo = hn::Min(lo, r);
+          hi = hn::Max(hi, r);
+        }
+      };
+      for (size_t i = 0; i < GROUP; i += 2) {
+        add(indices + i * ARITY, small, large);
+        add(indices + (i + 1) * ARITY, other_small, other_large);
+      }
+      hn::StoreU(hn::Min(small, other_small), d, aos + k);
+      hn::StoreU(hn::Max(large, other_large), d, aos + RECORD + k);
+    }
+  }
+}
+
+void BoundGroups(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
+                 int16_t* HWY_RESTRICT aos) {
+  if (arity == 1) return boundGroups<1>(records, indices, count, aos);
+  if (arity == 2) return boundGroups<2>(records, indices, count, aos);
+  boundGroups<3>(records, indices, count, aos);
+}
+
 void BuildUpper(const int16_t* HWY_RESTRICT child_aos, size_t child_count, int16_t* HWY_RESTRICT soa,
                 int16_t* HWY_RESTRICT aos) {
   HWY_ALIGN int16_t lo[GROUP * RECORD];
@@ -196,6 +266,7 @@ namespace simd {
 HWY_EXPORT(ProjectionBounds);
 HWY_EXPORT(Quantize);
 HWY_EXPORT(BuildLeaves);
+HWY_EXPORT(BoundGroups);
 HWY_EXPORT(BuildUpper);
 HWY_EXPORT(ShortenBounds);
 
@@ -208,6 +279,10 @@ void quantize(const double* vertices, std::size_t n, const double* low8, const d
 void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
                  const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildLeaves)(records, indices, arity, count, margin16, soa, aos);
+}
+void boundGroups(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 std::int16_t* aos) {
+  HWY_DYNAMIC_DISPATCH(BoundGroups)(records, indices, arity, count, aos);
 }
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildUpper)(child_aos, child_count, soa, aos);

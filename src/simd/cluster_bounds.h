@@ -51,6 +51,10 @@ void quantize(const double* vertices, std::size_t n, const double* low8, const d
 void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
                  const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos);
 
+/// The same aos, without margins, and nothing else.
+void boundGroups(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 std::int16_t* aos);
+
 /// Groups of the level above: child_aos holds child_count bounds; groups are filled up with empty lanes.
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos);
 

@@ -1,5 +1,7 @@
 #include "simd/surface_views.h"
 
+#include <utility>
+
 #include "dccd/tolerances.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -41,14 +43,37 @@ HWY_INLINE ViewVector sum(const ViewVector& a, const ViewVector& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
 
-/// Component k of VIEW_LINE, not normalised.
-HWY_INLINE ViewFloat along(const int (&line)[3], const ViewVector& v) {
+/// Along VIEW_LINE[K], not normalised.
+template <size_t K>
+HWY_INLINE ViewFloat along(const ViewVector& v) {
+  constexpr int X = VIEW_LINE[K][0], Y = VIEW_LINE[K][1], Z = VIEW_LINE[K][2];
   const ViewFloats d;
   ViewFloat total = hn::Zero(d);
-  if (line[0] != 0) total = v.x;  // never -1
-  if (line[1] != 0) total = line[1] > 0 ? hn::Add(total, v.y) : hn::Sub(total, v.y);
-  if (line[2] != 0) total = line[2] > 0 ? hn::Add(total, v.z) : hn::Sub(total, v.z);
+  if (X != 0) total = v.x;  // never -1
+  if (Y != 0) total = Y > 0 ? hn::Add(total, v.y) : hn::Sub(total, v.y);
+  if (Z != 0) total = Z > 0 ? hn::Add(total, v.z) : hn::Sub(total, v.z);
   return total;
+}
+
+/// Bits of the views along VIEW_LINE[K], where the three all lie beyond the margin, on one side.
+template <size_t K>
+HWY_INLINE hn::Vec<hn::RebindToUnsigned<ViewFloats>> facedAlong(const ViewVector& first, const ViewVector& middle,
+                                                                const ViewVector& last, ViewFloat margin) {
+  const hn::RebindToUnsigned<ViewFloats> du;
+  const ViewFloat a = along<K>(first), b = along<K>(middle), c = along<K>(last);
+  const auto front = hn::RebindMask(du, hn::Gt(hn::Min(hn::Min(a, b), c), margin));
+  const auto back = hn::RebindMask(du, hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(margin)));
+  return hn::Or(hn::IfThenElseZero(front, hn::Set(du, 1u << 2 * K)),
+                hn::IfThenElseZero(back, hn::Set(du, 2u << 2 * K)));
+}
+
+template <size_t... K>
+HWY_INLINE hn::Vec<hn::RebindToUnsigned<ViewFloats>> facedAlongAll(std::index_sequence<K...>, const ViewVector& first,
+                                                                   const ViewVector& middle, const ViewVector& last,
+                                                                   ViewFloat margin) {
+  auto faced = hn::Zero(hn::RebindToUnsigned<ViewFloats>());
+  ((faced = hn::Or(faced, facedAlong<K>(first, middle, last, margin))), ...);
+  return faced;
 }
 
 HWY_INLINE void viewGroup(const float* HWY_RESTRICT block, uint32_t* HWY_RESTRICT views) {
@@ -61,15 +86,7 @@ HWY_INLINE void viewGroup(const float* HWY_RESTRICT block, uint32_t* HWY_RESTRIC
     const ViewFloat size = hn::Max(hn::Max(largest(p0), largest(q0)), hn::Max(largest(p1), largest(q1)));
     const ViewFloat margin = hn::Add(hn::Mul(hn::Set(d, tolerance::FUSED_PLANAR), hn::Mul(size, size)),
                                      hn::Set(d, tolerance::FUSED_UNDERFLOW));
-    auto faced = hn::Zero(du);
-    const auto add = [&](hn::Mask<ViewFloats> mask, size_t view) HWY_ATTR {
-      faced = hn::Or(faced, hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, 1u << view)));
-    };
-    for (size_t k = 0; k < VIEW_LINES; ++k) {
-      const ViewFloat a = along(VIEW_LINE[k], first), b = along(VIEW_LINE[k], middle), c = along(VIEW_LINE[k], last);
-      add(hn::Gt(hn::Min(hn::Min(a, b), c), margin), 2 * k);
-      add(hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(margin)), 2 * k + 1);
-    }
+    const auto faced = facedAlongAll(std::make_index_sequence<VIEW_LINES>(), first, middle, last, margin);
     const auto guarded = hn::RebindMask(du, hn::Le(size, hn::Set(d, tolerance::FUSED_LARGEST_M)));
     hn::StoreU(hn::IfThenElseZero(guarded, faced), du, views + part);
   }

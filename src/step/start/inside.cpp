@@ -26,6 +26,7 @@ int sideOf(const double* p, const double* q, const double* point) {
 template <class Visit>
 void visitAbove(const ClusterTree& tree, const std::int16_t* record, int at, std::size_t level, std::size_t group,
                 const Visit& visit) {
+  if (level == 0) tree.needLeaves(group);
   const std::int16_t* from = record + at * simd::DIRECTIONS;
   const std::int16_t* low =
       tree.level(level).soa.data() + group * simd::SOA_SIZE + simd::soaIndex(at * simd::DIRECTIONS, 0);

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <numeric>
+#include <thread>
 
 #include "culling/scene_arrays.h"
 #include "support/step_support.h"
@@ -123,6 +125,55 @@ TEST(ClusterTree, EveryLevelBoundsWhatIsBelow) {
   std::vector<std::int16_t> records(scene.vertexCount() * simd::RECORD);
   simd::quantize(scene.vertices()->t0, scene.vertexCount(), low, scale, records.data());
   for (const ClusterTree& tree : scene.bodies()[0].trees) expectBounds(scene, tree, records);
+}
+
+TEST(ClusterTree, LeavesThatWaitAreMadeWhenTheyAreNeeded) {
+  std::vector<Index> features;
+  for (Index i = 0; i + 1 < 600; ++i) features.insert(features.end(), {i, i + 1});
+  std::vector<std::int16_t> records[2];
+  for (std::size_t i = 0; i < 600 * simd::RECORD; ++i) {
+    records[0].push_back(static_cast<std::int16_t>(i % 1009));
+    records[1].push_back(static_cast<std::int16_t>(i % 2003));
+  }
+  ClusterTree tree, before, after;
+  for (ClusterTree* t : {&tree, &before, &after}) {
+    t->build(features, 2);
+    t->refitLeaves(records[t == &after].data(), nullptr, 0, t->level(0).groups);
+    t->refitUpper();
+  }
+  const std::size_t groups = tree.level(0).groups;
+  tree.letLeavesWait(true, records[1].data());
+  tree.refitGroups(0, groups);
+  tree.refitUpper();
+  for (std::size_t l = 0; l < tree.height(); ++l) {
+    const ClusterTree::Level &level = tree.level(l), &expected = after.level(l);
+    EXPECT_TRUE(std::equal(expected.aos.data(), expected.aos.data() + level.groups * simd::AOS_SIZE, level.aos.data()));
+    if (l == 0) continue;
+    EXPECT_TRUE(std::equal(expected.soa.data(), expected.soa.data() + level.groups * simd::SOA_SIZE, level.soa.data()));
+  }
+  const auto isThatOf = [&](const ClusterTree& other, std::size_t group) {
+    const std::int16_t* soa = tree.level(0).soa.data() + group * simd::SOA_SIZE;
+    return std::equal(soa, soa + simd::SOA_SIZE, other.level(0).soa.data() + group * simd::SOA_SIZE);
+  };
+  tree.needLeaves(7);
+  for (std::size_t g = 0; g < groups; ++g) EXPECT_TRUE(isThatOf(g == 7 ? after : before, g)) << g;
+  std::vector<std::thread> threads;
+  std::atomic<std::size_t> ready{0};
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&] {
+      for (std::size_t g = 0; g < groups; ++g) {
+        tree.needLeaves(g);
+        ready += isThatOf(after, g);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(ready, 4 * groups);
+
+  tree.letLeavesWait(false, nullptr);
+  tree.refitLeaves(records[0].data(), nullptr, 0, groups);
+  tree.needLeaves(0);
+  EXPECT_TRUE(isThatOf(before, 0));
 }
 
 TEST(ClusterTree, MaskedFeaturesAreEmptyAndComeBack) {

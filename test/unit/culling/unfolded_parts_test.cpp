@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "support/closed_meshes.h"
 #include "support/detector.h"
 #include "support/surfaces.h"
 
@@ -45,6 +46,62 @@ TEST(UnfoldedParts, OnlyAFoldIsLookedAt) {
   EXPECT_GT(all.contacts.size(), 0u) << "the rolled part lies down on the rest";
   EXPECT_EQ(culled.contacts.size(), all.contacts.size());
   EXPECT_LT(2 * culled.stats[Stage::BROAD_PHASE].in, all.stats[Stage::BROAD_PHASE].in);
+}
+
+TEST(UnfoldedParts, AGloveIsFoundOutInSomeSteps) {
+  const test::Glove glove(160);
+  const Step step = stepOf(glove.topology, glove.curled(0.3), glove.curled(0.33));
+  Options options;
+  options.check_start_state = false;
+  test::Detector stream(options);
+  Outcome culled;
+  for (int i = 0; i < 25; ++i) culled = stream.run(step);
+  EXPECT_GE(culled.stats.unfolded_parts, 2u) << "its palm and its back";
+  EXPECT_LT(4 * culled.stats[Stage::BROAD_PHASE].in, runStep(step, false).stats[Stage::BROAD_PHASE].in);
+}
+
+// The bounds of leaves are made where they are asked for, some of them after others have been shortened. As all of it
+// moves on, too, bounds of different times are apart.
+TEST(UnfoldedParts, TheFirstContactIsTheSame) {
+  const std::size_t side = 61;
+  for (const double along : {-1, 1}) {
+    Positions t1 = rolled(side, 5);
+    for (Vec3& p : t1) p.z() += along;
+    const Step step = stepOf(Topology::grid(side, side), rolled(side, 2.8), t1);
+    std::vector<Outcome> outcomes;
+    for (const int threads : {0, 1, 2}) {
+      Options options;
+      options.check_start_state = false;
+      options.unfolded_test = threads > 0;
+      options.earliest_only = true;
+      options.num_threads = std::max(threads, 1);
+      outcomes.push_back(test::Detector(options).run(step));
+    }
+    ASSERT_GT(outcomes[0].contacts.size(), 0u);
+    EXPECT_LT(outcomes[0].contacts[0].toc_upper, 0.75) << "else no bounds are shortened";
+    for (const Outcome* culled : {&outcomes[1], &outcomes[2]}) {
+      EXPECT_GT(culled->stats.unfolded_parts, 0u);
+      ASSERT_EQ(culled->contacts.size(), outcomes[0].contacts.size());
+      for (std::size_t i = 0; i < culled->contacts.size(); ++i) {
+        EXPECT_EQ(culled->contacts[i].vertex, outcomes[0].contacts[i].vertex);
+        EXPECT_EQ(culled->contacts[i].toc_lower, outcomes[0].contacts[i].toc_lower);
+      }
+    }
+  }
+}
+
+TEST(UnfoldedParts, WhatIsInsideIsTheSame) {
+  test::TestStep step;
+  for (const double x : {-0.9, 0.1, 1.5}) {
+    step.bodies = {test::ball(Vec3::Zero(), 1, 5), test::ball({x, 0.02, 0.03}, 0.05, 0)};
+    for (const bool culled : {false, true}) {
+      Options options;
+      options.unfolded_test = culled;
+      const Outcome outcome = test::Detector(options).run(step.motion());
+      EXPECT_EQ(outcome.stats.unfolded_parts > 0, culled);
+      EXPECT_EQ(outcome.start_state, x < 1 ? StartState::INTERSECTING : StartState::CLEAR) << x << culled;
+    }
+  }
 }
 
 TEST(UnfoldedParts, TheStartStateIsTheSame) {

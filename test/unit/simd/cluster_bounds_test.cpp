@@ -55,6 +55,10 @@ TEST(ClusterBounds, LeavesHoldTheBoundsOfTheirVertices) {
                           soa.get(), aos.get());
         EXPECT_TRUE(std::equal(soa.get(), soa.get() + groups * SOA_SIZE, expected.soa.get())) << target << arity;
         EXPECT_TRUE(std::equal(aos.get(), aos.get() + groups * AOS_SIZE, expected.aos.get())) << target << arity;
+        if (with_margin) continue;
+        std::fill_n(aos.get(), groups * AOS_SIZE, std::int16_t{0});
+        simd::boundGroups(records.data(), indices.data(), arity, groups * GROUP, aos.get());
+        EXPECT_TRUE(std::equal(aos.get(), aos.get() + groups * AOS_SIZE, expected.aos.get())) << target << arity;
       }
     }
   });
