@@ -12,7 +12,7 @@ namespace dccd {
 
 /// other: a buffer.
 inline void radixSort(std::vector<std::uint64_t>& words, std::vector<std::uint64_t>& other) {
-  constexpr int DIGIT = 11;
+  constexpr int DIGIT = 12;
   constexpr std::size_t BUCKETS = std::size_t{1} << DIGIT, FEW = 1024;
   if (words.size() < FEW) return std::sort(words.begin(), words.end());
   other.resize(words.size());
