@@ -62,7 +62,8 @@ struct FacesLeft {
   std::size_t left;   ///< pairs with any such bit
 };
 
-/// slots: of A in a and of B in b for each pair, whose corners are all different, count <= MOST_FACE_PAIRS. left: of
+/// slots: of A in a and of B in b for each pair, count <= MOST_FACE_PAIRS. Faces that share a corner may be asked about
+/// the edges that do not end there: nothing of them is called certain. left: of
 /// those pairs with any such bit of an edge that is asked about, in order, the place << PLACE_SHIFT and these bits; has
 /// room for PAIRS_BEHIND more than count.
 constexpr unsigned PLACE_SHIFT = 16;

@@ -92,47 +92,57 @@ bool CrossingFinder::searchEdges(std::uint32_t edge_body, std::uint32_t face_bod
   });
 }
 
+/// Of those edges of pairs of faces that are asked about: what certainly meets to found, what may to pairs_. asked:
+/// such bits of each pair; null: of an edge's faces the one that stands for it is asked. Returns how many edges these
+/// are then.
+std::size_t CrossingFinder::addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
+                                         const std::uint8_t* asked, std::vector<EdgeFace>& found) {
+  const Neighbourhood &around_a = (*search_.neighbourhoods)[a], &around_b = (*search_.neighbourhoods)[b];
+  const ClusterTree& faces_a = search_.scene->bodies()[a].tree(FeatureKind::FACE);
+  const ClusterTree& faces_b = search_.scene->bodies()[b].tree(FeatureKind::FACE);
+  face_pairs_.resize(CHUNK + simd::PAIRS_BEHIND);
+  const auto [all_asked, left] =
+      simd::facePairFilter(search_.vertices, {faces_a.leaves(false).vertices, around_a.owns.data()},
+                           {faces_b.leaves(false).vertices, around_b.owns.data()}, slots, n, face_pairs_.data());
+  work_ += n / FACE_PAIRS_A_TEST;
+  for (std::size_t c = 0; c < left; ++c) {
+    const std::uint32_t soon = face_pairs_[std::min(c + FETCHED_AHEAD, left - 1)] >> simd::PLACE_SHIFT;
+    __builtin_prefetch(&around_a.own_edges[slots[2 * soon]]);
+    __builtin_prefetch(&around_b.own_edges[slots[2 * soon + 1]]);
+    const std::uint32_t i = face_pairs_[c] >> simd::PLACE_SHIFT, face = slots[2 * i], other = slots[2 * i + 1];
+    const unsigned wanted = asked ? asked[i] : EDGES, meeting = face_pairs_[c] >> simd::MEETS_SHIFT & wanted;
+    for (unsigned edges = meeting; edges != 0; edges &= edges - 1) {
+      const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
+      found.push_back(bit < 3 ? EdgeFace{a, around_a.own_edges[face][bit], b, other}
+                              : EdgeFace{b, around_b.own_edges[other][bit - 3], a, face});
+    }
+    const unsigned unsure = face_pairs_[c] & wanted & ~meeting;
+    if (unsure == 0) continue;
+    const Index *f = faces_a.lane<3>(face), *g = faces_b.lane<3>(other);
+    for (std::size_t k = 0; k < 3; ++k) {  // only their copies in float were read
+      __builtin_prefetch(search_.scene->vertices()[f[k * NEXT]].t0);
+      __builtin_prefetch(search_.scene->vertices()[g[k * NEXT]].t0);
+    }
+    for (unsigned edges = unsure; edges != 0; edges &= edges - 1) {
+      const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
+      const std::size_t k = bit % 3, next = k == 2 ? 0 : k + 1;
+      if (bit < 3) {
+        add({a, around_a.own_edges[face][k], b, other}, {f[k * NEXT], f[next * NEXT], g[0], g[NEXT], g[2 * NEXT]});
+      } else {
+        add({b, around_b.own_edges[other][k], a, face}, {g[k * NEXT], g[next * NEXT], f[0], f[NEXT], f[2 * NEXT]});
+      }
+    }
+  }
+  return all_asked;
+}
+
 bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePair& trees,
                                  const std::uint32_t* group_pairs, std::size_t count, std::vector<EdgeFace>& found) {
   work_ = 0;
-  face_pairs_.resize(CHUNK + simd::PAIRS_BEHIND);
-  const Neighbourhood &around_a = (*search_.neighbourhoods)[a], &around_b = (*search_.neighbourhoods)[b];
-  const simd::FacesView faces_a{trees.a->leaves(false).vertices, around_a.owns.data()};
-  const simd::FacesView faces_b{trees.b->leaves(false).vertices, around_b.owns.data()};
   const bool whole = stream_.run(trees, group_pairs, count, [&](const std::uint32_t* slots, std::size_t count) {
     for (const std::uint32_t* end = slots + 2 * count; slots != end;) {
       const std::size_t n = std::min(CHUNK, static_cast<std::size_t>(end - slots) / 2);
-      const auto [asked, left] = simd::facePairFilter(search_.vertices, faces_a, faces_b, slots, n, face_pairs_.data());
-      tested_ += asked;
-      work_ += n / FACE_PAIRS_A_TEST;
-      for (std::size_t c = 0; c < left; ++c) {
-        const std::uint32_t soon = face_pairs_[std::min(c + FETCHED_AHEAD, left - 1)] >> simd::PLACE_SHIFT;
-        __builtin_prefetch(&around_a.own_edges[slots[2 * soon]]);
-        __builtin_prefetch(&around_b.own_edges[slots[2 * soon + 1]]);
-        const std::uint32_t i = face_pairs_[c] >> simd::PLACE_SHIFT, face = slots[2 * i], other = slots[2 * i + 1];
-        const unsigned meeting = face_pairs_[c] >> simd::MEETS_SHIFT & EDGES,
-                       unsure = face_pairs_[c] & EDGES & ~meeting;
-        for (unsigned edges = meeting; edges != 0; edges &= edges - 1) {
-          const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
-          found.push_back(bit < 3 ? EdgeFace{a, around_a.own_edges[face][bit], b, other}
-                                  : EdgeFace{b, around_b.own_edges[other][bit - 3], a, face});
-        }
-        if (unsure == 0) continue;
-        const Index *f = trees.a->lane<3>(face), *g = trees.b->lane<3>(other);
-        for (std::size_t k = 0; k < 3; ++k) {  // only their copies in float were read
-          __builtin_prefetch(search_.scene->vertices()[f[k * NEXT]].t0);
-          __builtin_prefetch(search_.scene->vertices()[g[k * NEXT]].t0);
-        }
-        for (unsigned edges = unsure; edges != 0; edges &= edges - 1) {
-          const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
-          const std::size_t k = bit % 3, next = k == 2 ? 0 : k + 1;
-          if (bit < 3) {
-            add({a, around_a.own_edges[face][k], b, other}, {f[k * NEXT], f[next * NEXT], g[0], g[NEXT], g[2 * NEXT]});
-          } else {
-            add({b, around_b.own_edges[other][k], a, face}, {g[k * NEXT], g[next * NEXT], f[0], f[NEXT], f[2 * NEXT]});
-          }
-        }
-      }
+      tested_ += addFacePairs(a, b, slots, n, nullptr, found);
       if (pairs_.size() >= CHUNK && !flush(found)) return false;
       slots += 2 * n;
     }
@@ -141,37 +151,50 @@ bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePai
   return flush(found) && whole;
 }
 
-/// The edges opposite the vertex, of the faces at it, against those faces at it that share no edge with theirs.
+/// Pairs of faces at the vertex that share no edge, of which the edges opposite the vertex are asked about.
 void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex) {
   const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
   const std::uint32_t first = around.faces.begin[vertex], n = around.faces.begin[vertex + 1] - first;
   fan_.resize(n);
-  beside_.resize(n);
   for (std::uint32_t i = 0; i < n; ++i) {
     const std::uint32_t slot = around.faces.slots[first + i], k = after(around.corner[first + i]);
     const Index* face = faces.feature(slot);
-    fan_[i] = {slot, k, face[k], face[after(k)]};
+    fan_[i] = {slot, around.owns[slot] & 1u << k, face[k], face[after(k)]};
   }
-  const Index at = search_.scene->bodies()[body].internal_begin + static_cast<Index>(vertex);
-  for (const FaceOfFan& one : fan_) {
-    if ((around.owns[one.slot] >> one.edge & 1) == 0) continue;
-    std::uint32_t beside = 0;  // written without a branch on what nothing foretells
-    for (std::uint32_t j = 0; j < n; ++j) {
-      beside_[beside] = j;
-      beside +=
-          (one.from != fan_[j].from) & (one.from != fan_[j].to) & (one.to != fan_[j].from) & (one.to != fan_[j].to);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    if (fan_asked_.size() < fan_pairs_ + n) {
+      fan_asked_.resize(2 * (fan_pairs_ + n));
+      fan_slots_.resize(2 * fan_asked_.size());
     }
-    const std::uint32_t edge = around.own_edges[one.slot][one.edge];
-    for (std::uint32_t b = 0; b < beside; ++b) {
-      const FaceOfFan& other = fan_[beside_[b]];
-      add({body, edge, body, other.slot}, {one.from, one.to, at, other.from, other.to});
+    const FaceOfFan& one = fan_[i];
+    for (std::uint32_t j = i + 1; j < n; ++j) {  // without a branch on what nothing foretells
+      const FaceOfFan& other = fan_[j];
+      const unsigned asked = one.edge | other.edge << simd::SECOND_EDGES_SHIFT;
+      fan_slots_[2 * fan_pairs_] = one.slot;
+      fan_slots_[2 * fan_pairs_ + 1] = other.slot;
+      fan_asked_[fan_pairs_] = static_cast<std::uint8_t>(asked);
+      fan_pairs_ += (asked != 0) & (one.from != other.from) & (one.from != other.to) & (one.to != other.from) &
+                    (one.to != other.to);
     }
-    tested_ += beside;
   }
+}
+
+/// As flush() does.
+bool CrossingFinder::flushFans(std::uint32_t body, std::vector<EdgeFace>& found) {
+  for (std::size_t first = 0; first < fan_pairs_; first += CHUNK) {
+    const std::size_t n = std::min(CHUNK, fan_pairs_ - first);
+    for (std::size_t i = first; i < first + n; ++i)
+      tested_ += static_cast<std::size_t>(__builtin_popcount(fan_asked_[i]));
+    addFacePairs(body, body, fan_slots_.data() + 2 * first, n, fan_asked_.data() + first, found);
+    if (!flush(found)) return false;
+  }
+  fan_pairs_ = 0;
+  return goesOn(found);
 }
 
 bool CrossingFinder::searchFans(std::uint32_t body, std::size_t first, std::size_t last, std::vector<EdgeFace>& found) {
   work_ = 0;
+  fan_pairs_ = 0;
   const Neighbourhood& around = (*search_.neighbourhoods)[body];
   const std::size_t vertices = around.faces.begin.size() - 1;
   one_turn_.resize(last - first);
@@ -188,12 +211,11 @@ bool CrossingFinder::searchFans(std::uint32_t body, std::size_t first, std::size
     const std::size_t soon = other_turns_[std::min(i + FETCHED_AHEAD, other_turns_.size() - 1)];
     for (std::uint32_t f = around.faces.begin[soon]; f < around.faces.begin[soon + 1]; ++f) {
       __builtin_prefetch(faces.feature(around.faces.slots[f]));
-      __builtin_prefetch(&around.own_edges[around.faces.slots[f]]);
     }
     addFan(body, around, other_turns_[i]);
-    if (pairs_.size() >= CHUNK && !flush(found)) return false;
+    if (fan_pairs_ >= CHUNK && !flushFans(body, found)) return false;
   }
-  return flush(found);
+  return flushFans(body, found);
 }
 
 }  // namespace dccd

@@ -59,9 +59,11 @@ class CrossingFinder {
   std::uint64_t tested() const { return tested_; }
 
  private:
-  /// A face at a vertex, and which of its edges is opposite the vertex, from where to where.
+  /// A face at a vertex, the bit of its edge opposite the vertex if the face stands for that, and from where to where
+  /// it goes.
   struct FaceOfFan {
-    std::uint32_t slot, edge;
+    std::uint32_t slot;
+    unsigned edge;
     Index from, to;
   };
   bool goesOn(const std::vector<EdgeFace>& found);
@@ -72,6 +74,9 @@ class CrossingFinder {
   void add(const SceneArrays& scene, const EdgeFace& pair);
   void test(const double* positions, std::size_t first, std::size_t last, std::vector<EdgeFace>& found);
   bool flush(std::vector<EdgeFace>& found);
+  bool flushFans(std::uint32_t body, std::vector<EdgeFace>& found);
+  std::size_t addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
+                           const std::uint8_t* asked, std::vector<EdgeFace>& found);
   void addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex);
 
   Search search_;
@@ -83,7 +88,9 @@ class CrossingFinder {
   std::vector<std::uint8_t> meet_;                     // and whether it meets
   std::vector<std::uint32_t> face_pairs_;              // that simd::facePairFilter() left
   std::vector<FaceOfFan> fan_;                         // the faces at a vertex,
-  std::vector<std::uint32_t> beside_;                  // and those of them that share no edge with one
+  std::vector<std::uint32_t> fan_slots_;               // pairs of such,
+  std::vector<std::uint8_t> fan_asked_;                // and which of their edges are asked about; of these
+  std::size_t fan_pairs_ = 0;                          // are there
   std::vector<std::uint16_t> one_turn_;                // simd::fansOfOneTurn(),
   std::vector<std::size_t> other_turns_;               // and the vertices of which that is not known
 };
