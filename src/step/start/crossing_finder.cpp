@@ -23,6 +23,7 @@ void CrossingFinder::begin(const Search& search) {
   search_ = search;
   tested_ = 0;
   pairs_.clear();
+  corners_.clear();
 }
 
 bool CrossingFinder::goesOn(const std::vector<EdgeFace>& found) {
@@ -162,7 +163,7 @@ void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std
     fan_[i] = {slot, around.owns[slot] & 1u << k, face[k], face[after(k)]};
   }
   for (std::uint32_t i = 0; i < n; ++i) {
-    if (fan_asked_.size() < fan_pairs_ + n) {
+    if (fan_slots_.size() < 2 * (fan_pairs_ + n)) {  // the last one to grow, should memory end
       fan_asked_.resize(2 * (fan_pairs_ + n));
       fan_slots_.resize(2 * fan_asked_.size());
     }

@@ -397,8 +397,9 @@ void StartStateSearch::addFacesAtEdge(const SceneArrays& scene, std::uint32_t ed
 
 void StartStateSearch::learnNeighbourhoods(const SceneArrays& scene) {
   if (!neighbourhoods_.empty()) return;
-  neighbourhoods_.resize(scene.bodies().size());
-  for (std::size_t b = 0; b < neighbourhoods_.size(); ++b) neighbourhoods_[b].learn(scene, b);
+  std::vector<Neighbourhood> learnt(scene.bodies().size());
+  for (std::size_t b = 0; b < learnt.size(); ++b) learnt[b].learn(scene, b);
+  neighbourhoods_ = std::move(learnt);
 }
 
 void StartStateSearch::clear() {
