@@ -11,6 +11,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "simd/group_lanes-inl.h"
 #include "simd/vector_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -25,6 +26,10 @@ using DF = hn::CappedTag<float, 16>;
 using VF = hn::Vec<DF>;
 using Float3 = VectorOf<DF>;
 constexpr size_t PAIR_LANES = 16, PAIR_POINTS = 5, PAIR_POINT_SIZE = 4 * PAIR_LANES;
+HWY_ALIGN_MAX static constexpr uint32_t PLACES[PAIR_LANES] = {
+    0 << PLACE_SHIFT,  1 << PLACE_SHIFT,  2 << PLACE_SHIFT,  3 << PLACE_SHIFT, 4 << PLACE_SHIFT,  5 << PLACE_SHIFT,
+    6 << PLACE_SHIFT,  7 << PLACE_SHIFT,  8 << PLACE_SHIFT,  9 << PLACE_SHIFT, 10 << PLACE_SHIFT, 11 << PLACE_SHIFT,
+    12 << PLACE_SHIFT, 13 << PLACE_SHIFT, 14 << PLACE_SHIFT, 15 << PLACE_SHIFT};
 constexpr double FLOAT_ULPS = 0x1p29;  // so many times as large as a double's half ulp is a float's
 
 /// a0, a1, a2, b1, b2 relative to b0.
@@ -61,8 +66,9 @@ HWY_INLINE hn::Mask<DF> differ(const Signs& a, const Signs& b, const Signs& c) {
   return hn::And(hn::Or(hn::Or(a.plus, b.plus), c.plus), hn::Or(hn::Or(a.minus, b.minus), c.minus));
 }
 
-HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, float largest_coordinate, const uint32_t* HWY_RESTRICT asked,
-                          size_t count, uint8_t* HWY_RESTRICT edges) {
+/// Bits of the edges, of those that are asked about.
+HWY_INLINE hn::Vec<hn::RebindToUnsigned<DF>> pairBlock(const float* HWY_RESTRICT block, float largest_coordinate,
+                                                       const uint32_t* HWY_RESTRICT asked) {
   const DF d;
   const hn::RebindToUnsigned<DF> du;
   Float3 a[3], b[2];
@@ -88,16 +94,15 @@ HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, float largest_coordin
     if (i == 1) volume = dot(moment, a[0]);
   }
   const auto passes = [&](size_t i) HWY_ATTR {
-    const VF between = hn::Sub(hn::Sub(hn::Sub(height[i == 2 ? 0 : i + 1], height[i]), from[i]), to[i]);
-    return Signs(between, long_margin);
+    return hn::Sub(hn::Sub(hn::Sub(height[i == 2 ? 0 : i + 1], height[i]), from[i]), to[i]);
   };
-  const Signs along[3][3] = {{{from[0], short_margin}, passes(0), {to[0], short_margin}},
-                             {{from[1], short_margin}, passes(1), {to[1], short_margin}},
-                             {{from[2], short_margin}, passes(2), {to[2], short_margin}}};
+  const VF between[3] = {passes(0), passes(1), passes(2)};
+  const Signs along[3][3] = {{{from[0], short_margin}, {between[0], long_margin}, {to[0], short_margin}},
+                             {{from[1], short_margin}, {between[1], long_margin}, {to[1], short_margin}},
+                             {{from[2], short_margin}, {between[2], long_margin}, {to[2], short_margin}}};
   const auto sum = [](const VF* x) HWY_ATTR { return hn::Add(hn::Add(x[0], x[1]), x[2]); };
-  const Signs over[3] = {{hn::Neg(volume), long_margin},
-                         {hn::Sub(sum(from), volume), long_margin},
-                         {hn::Sub(hn::Neg(sum(to)), volume), long_margin}};
+  const VF depth[3] = {hn::Neg(volume), hn::Sub(sum(from), volume), hn::Sub(hn::Neg(sum(to)), volume)};
+  const Signs over[3] = {{depth[0], long_margin}, {depth[1], long_margin}, {depth[2], long_margin}};
 
   auto bits = hn::Zero(du), all = hn::Zero(du);
   const auto keep = [&](hn::Mask<DF> misses, size_t edge) HWY_ATTR {
@@ -115,38 +120,48 @@ HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, float largest_coordin
                             hn::And(areSame(over[0], over[1]), areSame(over[1], over[2])));
   bits = hn::IfThenZeroElse(hn::RebindMask(du, apart), bits);
   const auto guarded = hn::Le(size, hn::Set(d, tolerance::FUSED_LARGEST_M));
-  bits = hn::IfThenElse(hn::RebindMask(du, guarded), bits, all);
-  HWY_ALIGN_MAX uint32_t words[PAIR_LANES];
-  hn::Store(hn::And(bits, hn::Load(du, asked)), du, words);
-  for (size_t lane = 0; lane < count; ++lane) edges[lane] = static_cast<uint8_t>(words[lane]);
+  bits = hn::And(hn::IfThenElse(hn::RebindMask(du, guarded), bits, all), hn::Load(du, asked));
+  const auto nearest = [](const VF* x)
+                           HWY_ATTR { return hn::Min(hn::Min(hn::Abs(x[0]), hn::Abs(x[1])), hn::Abs(x[2])); };
+  const auto strict =
+      hn::And(guarded, hn::And(hn::Gt(hn::Min(hn::Min(nearest(height), nearest(from)), nearest(to)), short_margin),
+                               hn::Gt(hn::Min(nearest(between), nearest(depth)), long_margin)));
+  return hn::Or(bits, hn::IfThenElseZero(hn::RebindMask(du, strict), hn::ShiftLeft<MEETS_SHIFT>(bits)));
 }
 
-size_t FacePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                      const uint32_t* HWY_RESTRICT slots, size_t count, uint8_t* HWY_RESTRICT edges) {
+FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
+                         const uint32_t* HWY_RESTRICT slots, size_t count, uint32_t* HWY_RESTRICT left) {
+  const hn::RebindToUnsigned<DF> du;
   const size_t lanes = hn::Lanes(DF());
   HWY_ALIGN_MAX float blocks[2][PAIR_POINTS * PAIR_POINT_SIZE] = {};
   HWY_ALIGN_MAX uint32_t asked[2][PAIR_LANES] = {};
-  size_t all = 0;
+  FacesLeft result{0, 0};
   const auto corners = [](const FacesView& of, size_t slot)
-                           HWY_ATTR { return of.vertices + slot / GROUP * 3 * GROUP + slot % GROUP; };
+                           HWY_ATTR { return of.vertices + slot + 2 * (slot & ~(GROUP - 1)); };
   const auto fill = [&](size_t first, size_t block) HWY_ATTR {
     const size_t n = first >= count ? 0 : HWY_MIN(lanes, count - first);
     for (size_t lane = 0; lane < n; ++lane) {
       const size_t f = slots[2 * (first + lane)], g = slots[2 * (first + lane) + 1];
       gatherPair(vertices.positions, corners(a, f), corners(b, g), lane, blocks[block]);
       asked[block][lane] = uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
-      all += hwy::PopCount(asked[block][lane]);
+      result.asked += hwy::PopCount(asked[block][lane]);
     }
+    for (size_t lane = n; lane < lanes; ++lane) asked[block][lane] = 0;
     return n;
   };
   // The next block is filled before this one is tested, as in segment_filter.cpp.
   size_t now = 0;
   for (size_t first = 0, n = fill(0, 0); n > 0; first += lanes, now = 1 - now) {
     const size_t next = fill(first + lanes, 1 - now);
-    pairBlock(blocks[now], vertices.largest, asked[now], n, edges + first);
+    // Without a branch on how many are left: a whole vector is stored.
+    const auto bits = pairBlock(blocks[now], vertices.largest, asked[now]);
+    const auto met = hn::Ne(bits, hn::Zero(du));
+    const auto places = hn::Add(hn::Load(du, PLACES), hn::Set(du, static_cast<uint32_t>(first << PLACE_SHIFT)));
+    hn::StoreU(hn::Compress(hn::Or(bits, places), met), du, left + result.left);
+    result.left += hn::CountTrue(du, met);
     n = next;
   }
-  return all;
+  return result;
 }
 
 // --- faces along the axes --------------------------------------------------------------------------------------------
@@ -154,7 +169,7 @@ size_t FacePairFilter(const NearVertices& vertices, const FacesView& a, const Fa
 constexpr size_t FACE_POINT_SIZE = 4 * GROUP;
 
 /// Of all lanes of a vector of faces.
-HWY_INLINE void viewBlock(const float* HWY_RESTRICT block, float largest_coordinate, uint16_t* HWY_RESTRICT views) {
+HWY_INLINE void viewBlock(const float* HWY_RESTRICT block, float largest_coordinate, uint32_t* HWY_RESTRICT views) {
   const DF d;
   const hn::RebindToUnsigned<DF> du;
   const Float3 p0 = loadPoint(d, block), p1 = loadPoint(d, block + FACE_POINT_SIZE);
@@ -175,17 +190,15 @@ HWY_INLINE void viewBlock(const float* HWY_RESTRICT block, float largest_coordin
   for (size_t k = 0; k < 3; ++k) {
     add(hn::And(guarded, hn::Gt(n[k], margin)), TURNS_LEFT << k);
     add(hn::And(guarded, hn::Lt(n[k], hn::Neg(margin))), TURNS_RIGHT << k);
-    add(hn::And(hn::Lt(c1[k], c0[k]), hn::Ge(c2[k], c0[k])), RISES << k);
-    add(hn::And(hn::Lt(c2[k], c1[k]), hn::Ge(c0[k], c1[k])), RISES << (3 + k));
-    add(hn::And(hn::Lt(c0[k], c2[k]), hn::Ge(c1[k], c2[k])), RISES << (6 + k));
+    add(hn::And(hn::Lt(c1[k], c0[k]), hn::Ge(c2[k], c0[k])), RISES << (8 * k));
+    add(hn::And(hn::Lt(c2[k], c1[k]), hn::Ge(c0[k], c1[k])), RISES << (8 * k + 1));
+    add(hn::And(hn::Lt(c0[k], c2[k]), hn::Ge(c1[k], c2[k])), RISES << (8 * k + 2));
   }
-  HWY_ALIGN_MAX uint32_t words[PAIR_LANES];
-  hn::Store(bits, du, words);
-  for (size_t lane = 0; lane < hn::Lanes(d); ++lane) views[lane] = static_cast<uint16_t>(words[lane]);
+  hn::StoreU(bits, du, views);
 }
 
 void FaceViews(const NearVertices& vertices, const uint32_t* HWY_RESTRICT groups, size_t count,
-               uint16_t* HWY_RESTRICT views) {
+               uint32_t* HWY_RESTRICT views) {
   const hn::CappedTag<float, 4> d;
   HWY_ALIGN_MAX float blocks[2][3 * FACE_POINT_SIZE] = {};
   const auto fill = [&](size_t g) HWY_ATTR {
@@ -206,6 +219,33 @@ void FaceViews(const NearVertices& vertices, const uint32_t* HWY_RESTRICT groups
     fill(g + 1);
     for (size_t lane = 0; lane < GROUP; lane += hn::Lanes(DF())) {
       viewBlock(blocks[g % 2] + lane * 4, vertices.largest, views + g * GROUP + lane);
+    }
+  }
+}
+
+void FansOfOneTurn(const uint32_t* HWY_RESTRICT views, const FansView& fans, size_t first, size_t count,
+                   uint16_t* HWY_RESTRICT one_turn) {
+  const hn::CappedTag<uint32_t, GROUP> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  constexpr unsigned CORNER = 3, A_BYTE = 0xff;
+  for (size_t g = 0; g < count; ++g) {
+    const uint32_t begin = fans.begin[first + g], end = fans.begin[first + g + 1];
+    one_turn[g] = 0;
+    for (size_t lane = 0; lane < GROUP; lane += hn::Lanes(d)) {
+      auto turns = hn::Set(d, TURNS), rises = hn::Zero(d);  // a byte of rises for each axis
+      for (uint32_t row = begin; row < end; ++row) {
+        const auto at = hn::LoadU(d, fans.corners + size_t{row} * GROUP + lane);
+        const auto view = hn::GatherOffset(d, views, hn::BitCast(di, hn::AndNot(hn::Set(d, CORNER), at)));
+        turns = hn::And(turns, view);
+        rises = hn::Add(rises, hn::And(hn::Shr(view, hn::And(at, hn::Set(d, CORNER))), hn::Set(d, RISES * 0x10101)));
+      }
+      turns = hn::Or(turns, hn::ShiftRight<3>(turns));
+      const auto along = [&](unsigned k) HWY_ATTR {
+        const auto once = hn::Eq(hn::And(rises, hn::Set(d, RISES * A_BYTE << (8 * k))), hn::Set(d, RISES << (8 * k)));
+        return hn::And(once, hn::TestBit(turns, hn::Set(d, TURNS_LEFT << k)));
+      };
+      const auto is_one = hn::Or(hn::Or(along(0), along(1)), along(2));
+      one_turn[g] = static_cast<uint16_t>(one_turn[g] | bitsOf(d, is_one) << lane);
     }
   }
 }
@@ -232,6 +272,7 @@ namespace dccd {
 namespace simd {
 HWY_EXPORT(FacePairFilter);
 HWY_EXPORT(FaceViews);
+HWY_EXPORT(FansOfOneTurn);
 HWY_EXPORT(MoveNear);
 float largestNear(double largest) {
   constexpr float INFINITE = std::numeric_limits<float>::infinity();
@@ -240,12 +281,16 @@ float largestNear(double largest) {
 void moveNear(const double* positions, std::size_t count, const double* origin, float* near) {
   HWY_DYNAMIC_DISPATCH(MoveNear)(positions, count, origin, near);
 }
-std::size_t facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                           const std::uint32_t* slots, std::size_t count, std::uint8_t* edges) {
-  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, count, edges);
+FacesLeft facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
+                         const std::uint32_t* slots, std::size_t count, std::uint32_t* left) {
+  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, count, left);
 }
-void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint16_t* views) {
+void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views) {
   HWY_DYNAMIC_DISPATCH(FaceViews)(vertices, groups, count, views);
+}
+void fansOfOneTurn(const std::uint32_t* views, const FansView& fans, std::size_t first, std::size_t count,
+                   std::uint16_t* one_turn) {
+  HWY_DYNAMIC_DISPATCH(FansOfOneTurn)(views, fans, first, count, one_turn);
 }
 }  // namespace simd
 }  // namespace dccd

@@ -7,12 +7,14 @@
 // line of each edge of B passes A, and with a0.(a1 x a2) the sum over A's edges of m.b says on which side of A's plane
 // b is. An edge of one face does not meet the other where its ends are strictly on one side of the other's plane, or
 // where its line passes two edges of the other on strictly different sides (segment_filter.h has why, for degenerate
-// faces, too). These are the sums of segment_filter.h, of up to four dot products with a cross product, here in float,
-// u = 2^-24, of vertices that are rounded to float once. Their differences err by the same multiples of u M as there.
-// By rounding, a vertex moved by at most u R along each axis, R = the largest |coordinate|, and a difference by
-// e = 2u R. If e <= M, a dot product with a cross product (six products of three) changed by at most
-// 18 M^2 e + 18 M e^2 + 6 e^3 <= 42 M^2 e, and else it is below 6 M^3. So margins of the same multiples of u M^2 (M +
-// 2R) cover all. Underflow adds at most 2^-100 as in fused_filter.h; pairs with an M above 2^30 are kept.
+// faces, too). Where it is kept and all these signs are strict, its ends are on different sides of the other's plane
+// and its line passes all edges on one side: it meets the inside of the other. These are the sums of segment_filter.h,
+// of up to four dot products with a cross product, here in float, u = 2^-24, of vertices that are rounded to float
+// once. Their differences err by the same multiples of u M as there. By rounding, a vertex moved by at most u R along
+// each axis, R = the largest |coordinate|, and a difference by e = 2u R. If e <= M, a dot product with a cross product
+// (six products of three) changed by at most 18 M^2 e + 18 M e^2 + 6 e^3 <= 42 M^2 e, and else it is below 6 M^3. So
+// margins of the same multiples of u M^2 (M + 2R) cover all. Underflow adds at most 2^-100 as in fused_filter.h; pairs
+// with an M above 2^30 are kept.
 //
 // Along an axis a face turns one way or the other by the sign of its normal's component, certain beyond such a margin:
 // e changes the component by at most 4 M e + 2 e^2. It is certain of the face as it was, as it is rounded, and of all
@@ -33,8 +35,8 @@ namespace dccd {
 namespace simd {
 
 /// Bits of a pair of faces: an edge of the first (k: from corner k to the next), and of the second, that may meet the
-/// other face.
-constexpr unsigned FIRST_EDGES = 0x07, SECOND_EDGES_SHIFT = 3;
+/// other face; and the same again of those that certainly do.
+constexpr unsigned SECOND_EDGES_SHIFT = 3, MEETS_SHIFT = 8;
 
 /// Vertices as the filters take them: x, y, z from some origin in float, and a fourth number that means nothing.
 struct NearVertices {
@@ -49,24 +51,46 @@ float largestNear(double largest);
 /// positions: as for segmentFilter(), count of them. origin: x, y, z and 0. Writes NearVertices::positions.
 void moveNear(const double* positions, std::size_t count, const double* origin, float* near);
 
-/// Faces in groups, by their slots, and which of their edges are asked about (FIRST_EDGES).
+/// Faces in groups, by their slots, and which of their edges are asked about: bit k of the k-th.
 struct FacesView {
   const std::uint32_t* vertices;  ///< as in GroupsView::vertices (simd/group_pairs.h)
   const std::uint8_t* edges;
 };
 
-/// slots: of A in a and of B in b for each pair, whose corners are all different. edges: such bits for each pair, of
-/// the edges that are asked about. Returns how many these are.
-std::size_t facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                           const std::uint32_t* slots, std::size_t count, std::uint8_t* edges);
+struct FacesLeft {
+  std::size_t asked;  ///< edges of the pairs
+  std::size_t left;   ///< pairs with any such bit
+};
 
-/// Bits of how a face is seen: TURNS_LEFT << k and TURNS_RIGHT << k along axis k; RISES << (3 c + k): from the corner
+/// slots: of A in a and of B in b for each pair, count <= MOST_FACE_PAIRS. Faces that share a corner may be asked about
+/// the edges that do not end there: nothing of them is called certain. left: of
+/// those pairs with any such bit of an edge that is asked about, in order, the place << PLACE_SHIFT and these bits; has
+/// room for PAIRS_BEHIND more than count.
+constexpr unsigned PLACE_SHIFT = 16;
+constexpr std::size_t MOST_FACE_PAIRS = 1 << 16, PAIRS_BEHIND = 16;
+FacesLeft facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
+                         const std::uint32_t* slots, std::size_t count, std::uint32_t* left);
+
+/// Bits of how a face is seen: TURNS_LEFT << k and TURNS_RIGHT << k along axis k; RISES << (8 k + c): from the corner
 /// after corner c to the one after that it goes from low to not low.
-constexpr unsigned TURNS_LEFT = 1, TURNS_RIGHT = 1 << 3, RISES = 1 << 6;
+constexpr unsigned TURNS_LEFT = 1, TURNS_RIGHT = 1 << 3, TURNS = 0x3f, RISES = 1 << 8;
 
 /// groups: of 16 faces as in FacesView::vertices, UINT32_MAX in empty lanes, whose bits mean nothing. views: such bits
 /// of each face.
-void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint16_t* views);
+void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views);
+
+/// The faces at each vertex, of 16 vertices side by side: lane j of rows begin[g] to begin[g + 1] holds those at vertex
+/// 16 g + j, a face's slot times 4 and which of its corners the vertex is. A lane with fewer of them is filled up with
+/// those of a slot whose view is TURNS. At most 255 rows.
+struct FansView {
+  const std::uint32_t* begin;
+  const std::uint32_t* corners;  ///< GROUP a row
+};
+
+/// one_turn: for groups of vertices from `first` on, bit j where the faces at vertex j turn the same way along some
+/// axis and make one turn.
+void fansOfOneTurn(const std::uint32_t* views, const FansView& fans, std::size_t first, std::size_t count,
+                   std::uint16_t* one_turn);
 
 }  // namespace simd
 }  // namespace dccd

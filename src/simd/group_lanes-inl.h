@@ -79,6 +79,16 @@ HWY_INLINE V apartAlso(V apart, V one, V other) {
 #endif
 }
 
+// Negative where one of them is, as above.
+template <class V>
+HWY_INLINE V apartAlsoAtOnce(V apart, V one, V other) {
+#if DCCD_AVX512
+  return hn::Or3(apart, one, other);
+#else
+  return hn::Min(apart, hn::Min(one, other));
+#endif
+}
+
 // Bit per lane of two directions: 1 where neither is negative. Without AVX-512 `apart` is never positive: it begins as
 // zero and only takes minima, so that what is not negative is zero.
 template <class D>
@@ -97,7 +107,7 @@ HWY_INLINE hn::Vec<D> apartIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, con
   const size_t smallest = soaIndex(k, 0), largest = smallest + RECORD * GROUP;
   const auto above0 = hn::SaturatedSub(lanes(largest), both(d, lo + k * stride));
   const auto below0 = hn::SaturatedSub(both(d, hi + k * stride), lanes(smallest));
-  if (T0_ONLY) return apartAlso(apartAlso(apart, above0, above0), below0, below0);
+  if (T0_ONLY) return apartAlsoAtOnce(apart, above0, below0);
   const size_t t1 = (DIRECTIONS + k) * stride;
   const auto above1 = hn::SaturatedSub(lanes(largest + SOA_T1), both(d, lo + t1));
   const auto below1 = hn::SaturatedSub(both(d, hi + t1), lanes(smallest + SOA_T1));

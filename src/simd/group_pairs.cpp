@@ -112,6 +112,34 @@ HWY_INLINE const LanePairs& pairsOf(const KnownPairs& known, uint32_t g, uint32_
   return NONE;
 }
 
+// What is left out of the pairs of groups, one after another: of() of the one that came last to next() but one. The
+// first of them comes before that.
+struct NoneOf {
+  HWY_INLINE void next(uint32_t, uint32_t) {}
+  HWY_INLINE LeaveNoneOut of(uint32_t, uint32_t, bool) const { return {}; }
+};
+
+template <size_t A, size_t B>
+struct AdjacentOf {
+  const GroupsView &a, &b;
+  HWY_INLINE void next(uint32_t, uint32_t) {}
+  HWY_INLINE LeaveAdjacentOut<A, B> of(uint32_t g, uint32_t h, bool by_rows) const {
+    return {a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows};
+  }
+};
+
+// Looked up, and fetched from far away, while the pair before is tested.
+struct KnownOf {
+  const KnownPairs& known;
+  const LanePairs *now = nullptr, *soon = nullptr;
+  HWY_INLINE void next(uint32_t g, uint32_t h) {
+    now = soon;
+    soon = &pairsOf(known, g, h);
+    hwy::Prefetch(soon);
+  }
+  HWY_INLINE LeaveKnownOut of(uint32_t, uint32_t, bool by_rows) const { return {by_rows ? now->rows : now->columns}; }
+};
+
 // Whether a node meets anything is unpredictable. Where a test costs no more than a mispredicted branch, all nodes are
 // tested first, and then what met is written.
 constexpr bool WRITES_LATER = DCCD_AVX512;
@@ -119,7 +147,7 @@ constexpr bool WRITES_LATER = DCCD_AVX512;
 // The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
-                              Diagonal diagonal, const LeaveOutOf& leaveOutOf, uint32_t* HWY_RESTRICT o) {
+                              Diagonal diagonal, const LeaveOutOf& left_out, uint32_t* HWY_RESTRICT o) {
   const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
   const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
   const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
@@ -135,7 +163,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   const uint32_t inner_mask = by_rows ? cols : rows;
   const PairWriter writer(by_rows, (by_rows ? h : g) * GROUP);
   const uint32_t base = (by_rows ? g : h) * GROUP;
-  const auto leave_out = leaveOutOf(g, h, by_rows);
+  const auto leave_out = left_out.of(g, h, by_rows);
   constexpr bool LEAVES_OUT_FIRST = decltype(leave_out)::FIRST;
   const auto write = [&](uint32_t i, uint32_t mask)
                          HWY_ATTR { o = writer.write(base + i, LEAVES_OUT_FIRST ? mask : leave_out.from(i, mask), o); };
@@ -171,22 +199,24 @@ HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
   }
 }
 
-// leaveOutOf(g, h, by_rows): what is left out of a pair of groups, of which the first one's nodes are gone through, or
-// the other's.
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint32_t* HWY_RESTRICT group_pairs,
-                            size_t count, bool self, Diagonal diagonal, const LeaveOutOf& leaveOutOf,
-                            uint32_t* HWY_RESTRICT out, size_t capacity, size_t* consumed) {
+                            size_t count, bool self, Diagonal diagonal, LeaveOutOf left_out, uint32_t* HWY_RESTRICT out,
+                            size_t capacity, size_t* consumed) {
   uint32_t* o = out;
   size_t p = 0;
+  if (count > 0) left_out.next(group_pairs[0], group_pairs[1]);
   // There is room for every pair of a pair of groups, so that testPair() need not look.
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
     if (p + 2 < count) {
-      prefetch<T0_ONLY>(a, group_pairs[2 * p + 4]);
-      prefetch<T0_ONLY>(b, group_pairs[2 * p + 5]);
+      const uint32_t a_soon = group_pairs[2 * p + 4], b_soon = group_pairs[2 * p + 5];
+      if (a_soon != g) prefetch<T0_ONLY>(a, a_soon);
+      if (b_soon != h) prefetch<T0_ONLY>(b, b_soon);
     }
-    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, leaveOutOf, o);
+    const size_t next = p + 1 < count ? p + 1 : p;
+    left_out.next(group_pairs[2 * next], group_pairs[2 * next + 1]);
+    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, left_out, o);
   }
   *consumed = p;
   return static_cast<size_t>(o - out) / 2;
@@ -194,18 +224,15 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
 
 size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
                       Diagonal diagonal, bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
-  const auto none = [](uint32_t, uint32_t, bool) { return LeaveNoneOut(); };
-  return t0_only ? testPairs<true>(a, b, group_pairs, count, self, diagonal, none, out, capacity, consumed)
-                 : testPairs<false>(a, b, group_pairs, count, self, diagonal, none, out, capacity, consumed);
+  return t0_only ? testPairs<true>(a, b, group_pairs, count, self, diagonal, NoneOf(), out, capacity, consumed)
+                 : testPairs<false>(a, b, group_pairs, count, self, diagonal, NoneOf(), out, capacity, consumed);
 }
 
 template <size_t A, size_t B>
 HWY_INLINE size_t testUnsharedPairsOf(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs,
                                       size_t count, bool self, bool t0_only, uint32_t* out, size_t capacity,
                                       size_t* consumed) {
-  const auto adjacent = [&](uint32_t g, uint32_t h, bool by_rows) {
-    return LeaveAdjacentOut<A, B>{a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows};
-  };
+  const AdjacentOf<A, B> adjacent{a, b};
   constexpr auto UPPER = Diagonal::STRICT_UPPER;
   return t0_only ? testPairs<true>(a, b, group_pairs, count, self, UPPER, adjacent, out, capacity, consumed)
                  : testPairs<false>(a, b, group_pairs, count, self, UPPER, adjacent, out, capacity, consumed);
@@ -220,11 +247,8 @@ size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_
 
 size_t TestOtherPairs(const GroupsView& tree, const uint32_t* group_pairs, size_t count, const KnownPairs& left_out,
                       uint32_t* out, size_t capacity, size_t* consumed) {
-  const auto known = [&](uint32_t g, uint32_t h, bool by_rows) HWY_ATTR {
-    const LanePairs& pairs = pairsOf(left_out, g, h);
-    return LeaveKnownOut{by_rows ? pairs.rows : pairs.columns};
-  };
-  return testPairs<true>(tree, tree, group_pairs, count, true, Diagonal::STRICT_UPPER, known, out, capacity, consumed);
+  return testPairs<true>(tree, tree, group_pairs, count, true, Diagonal::STRICT_UPPER, KnownOf{left_out}, out, capacity,
+                         consumed);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -88,7 +88,7 @@ IsWrong judgeSegment(const MarginInput& input) {
     // Two faces of one group: corner k of face j at [GROUP * k + j].
     static constexpr std::uint32_t CORNERS[2 * simd::GROUP + 2] = {0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
                                                                    4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 5};
-    static constexpr std::uint8_t ALL_EDGES[2] = {simd::FIRST_EDGES, simd::FIRST_EDGES};
+    static constexpr std::uint8_t ALL_EDGES[2] = {7, 7};
     static constexpr std::uint32_t SLOTS[2] = {0, 1};
     double middle[4] = {}, largest = 0;
     for (int k = 0; k < 3; ++k) {
@@ -98,10 +98,10 @@ IsWrong judgeSegment(const MarginInput& input) {
     }
     float near[6 * 4];
     simd::moveNear(points[0], 6, middle, near);
-    std::uint8_t edges;
+    std::uint32_t edges[1 + simd::PAIRS_BEHIND] = {};
     simd::facePairFilter({near, simd::largestNear(largest)}, {CORNERS, ALL_EDGES}, {CORNERS, ALL_EDGES}, SLOTS, 1,
-                         &edges);
-    return meets && (edges & 1) == 0;
+                         edges);
+    return meets ? (edges[0] & 1) == 0 : (edges[0] >> simd::MEETS_SHIFT & 1) != 0;
   };
 }
 

@@ -11,9 +11,11 @@ namespace {
 constexpr std::size_t NEXT = simd::GROUP;  // vertex of a lane
 // Pairs that stay in the first-level cache; with a deadline, also those between two looks at the clock.
 constexpr std::size_t CHUNK = 512, CHUNK_WITH_DEADLINE = 64;
-constexpr std::size_t GROUPS_VIEWED = 4;  // at once, of neighbouring faces
+constexpr std::size_t FETCHED_AHEAD = 8;  // pairs of faces, or vertices
+constexpr std::uint32_t after(std::uint32_t corner) { return corner == 2 ? 0 : corner + 1; }
 // A unit that is begun may go on for this many tests, so that a search comes to its end in the end.
 constexpr std::size_t TESTS_IN_ANY_CASE = 1024, FACE_PAIRS_A_TEST = 8;
+constexpr unsigned EDGES = 0x3f;  // of a pair of faces
 
 }  // namespace
 
@@ -21,7 +23,7 @@ void CrossingFinder::begin(const Search& search) {
   search_ = search;
   tested_ = 0;
   pairs_.clear();
-  viewed_.clear();
+  corners_.clear();
 }
 
 bool CrossingFinder::goesOn(const std::vector<EdgeFace>& found) {
@@ -91,43 +93,57 @@ bool CrossingFinder::searchEdges(std::uint32_t edge_body, std::uint32_t face_bod
   });
 }
 
+/// Of those edges of pairs of faces that are asked about: what certainly meets to found, what may to pairs_. asked:
+/// such bits of each pair; null: of an edge's faces the one that stands for it is asked. Returns how many edges these
+/// are then.
+std::size_t CrossingFinder::addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
+                                         const std::uint8_t* asked, std::vector<EdgeFace>& found) {
+  const Neighbourhood &around_a = (*search_.neighbourhoods)[a], &around_b = (*search_.neighbourhoods)[b];
+  const ClusterTree& faces_a = search_.scene->bodies()[a].tree(FeatureKind::FACE);
+  const ClusterTree& faces_b = search_.scene->bodies()[b].tree(FeatureKind::FACE);
+  face_pairs_.resize(CHUNK + simd::PAIRS_BEHIND);
+  const auto [all_asked, left] =
+      simd::facePairFilter(search_.vertices, {faces_a.leaves(false).vertices, around_a.owns.data()},
+                           {faces_b.leaves(false).vertices, around_b.owns.data()}, slots, n, face_pairs_.data());
+  work_ += n / FACE_PAIRS_A_TEST;
+  for (std::size_t c = 0; c < left; ++c) {
+    const std::uint32_t soon = face_pairs_[std::min(c + FETCHED_AHEAD, left - 1)] >> simd::PLACE_SHIFT;
+    __builtin_prefetch(&around_a.own_edges[slots[2 * soon]]);
+    __builtin_prefetch(&around_b.own_edges[slots[2 * soon + 1]]);
+    const std::uint32_t i = face_pairs_[c] >> simd::PLACE_SHIFT, face = slots[2 * i], other = slots[2 * i + 1];
+    const unsigned wanted = asked ? asked[i] : EDGES, meeting = face_pairs_[c] >> simd::MEETS_SHIFT & wanted;
+    for (unsigned edges = meeting; edges != 0; edges &= edges - 1) {
+      const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
+      found.push_back(bit < 3 ? EdgeFace{a, around_a.own_edges[face][bit], b, other}
+                              : EdgeFace{b, around_b.own_edges[other][bit - 3], a, face});
+    }
+    const unsigned unsure = face_pairs_[c] & wanted & ~meeting;
+    if (unsure == 0) continue;
+    const Index *f = faces_a.lane<3>(face), *g = faces_b.lane<3>(other);
+    for (std::size_t k = 0; k < 3; ++k) {  // only their copies in float were read
+      __builtin_prefetch(search_.scene->vertices()[f[k * NEXT]].t0);
+      __builtin_prefetch(search_.scene->vertices()[g[k * NEXT]].t0);
+    }
+    for (unsigned edges = unsure; edges != 0; edges &= edges - 1) {
+      const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
+      const std::size_t k = bit % 3, next = k == 2 ? 0 : k + 1;
+      if (bit < 3) {
+        add({a, around_a.own_edges[face][k], b, other}, {f[k * NEXT], f[next * NEXT], g[0], g[NEXT], g[2 * NEXT]});
+      } else {
+        add({b, around_b.own_edges[other][k], a, face}, {g[k * NEXT], g[next * NEXT], f[0], f[NEXT], f[2 * NEXT]});
+      }
+    }
+  }
+  return all_asked;
+}
+
 bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePair& trees,
                                  const std::uint32_t* group_pairs, std::size_t count, std::vector<EdgeFace>& found) {
   work_ = 0;
-  edges_.resize(CHUNK);
-  crossing_.resize(CHUNK);
-  const Neighbourhood &around_a = (*search_.neighbourhoods)[a], &around_b = (*search_.neighbourhoods)[b];
-  const simd::FacesView faces_a{trees.a->leaves(false).vertices, around_a.owns.data()};
-  const simd::FacesView faces_b{trees.b->leaves(false).vertices, around_b.owns.data()};
   const bool whole = stream_.run(trees, group_pairs, count, [&](const std::uint32_t* slots, std::size_t count) {
     for (const std::uint32_t* end = slots + 2 * count; slots != end;) {
       const std::size_t n = std::min(CHUNK, static_cast<std::size_t>(end - slots) / 2);
-      tested_ += simd::facePairFilter(search_.vertices, faces_a, faces_b, slots, n, edges_.data());
-      work_ += n / FACE_PAIRS_A_TEST;
-      // First which, without a branch on what nothing foretells.
-      std::size_t crossing = 0;
-      for (std::size_t i = 0; i < n; ++i) {
-        crossing_[crossing] = static_cast<std::uint32_t>(i);
-        crossing += edges_[i] != 0;
-      }
-      for (std::size_t c = 0; c < crossing; ++c) {
-        const std::size_t i = crossing_[c];
-        const std::uint32_t face = slots[2 * i], other = slots[2 * i + 1];
-        const Index *f = trees.a->lane<3>(face), *g = trees.b->lane<3>(other);
-        for (std::size_t k = 0; k < 3; ++k) {  // only their copies in float were read
-          __builtin_prefetch(search_.scene->vertices()[f[k * NEXT]].t0);
-          __builtin_prefetch(search_.scene->vertices()[g[k * NEXT]].t0);
-        }
-        for (unsigned edges = edges_[i]; edges != 0; edges &= edges - 1) {
-          const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
-          const std::size_t k = bit % 3, next = k == 2 ? 0 : k + 1;
-          if (bit < 3) {
-            add({a, around_a.own_edges[face][k], b, other}, {f[k * NEXT], f[next * NEXT], g[0], g[NEXT], g[2 * NEXT]});
-          } else {
-            add({b, around_b.own_edges[other][k], a, face}, {g[k * NEXT], g[next * NEXT], f[0], f[NEXT], f[2 * NEXT]});
-          }
-        }
-      }
+      tested_ += addFacePairs(a, b, slots, n, nullptr, found);
       if (pairs_.size() >= CHUNK && !flush(found)) return false;
       slots += 2 * n;
     }
@@ -136,79 +152,71 @@ bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePai
   return flush(found) && whole;
 }
 
-/// What is seen of a face along the axes, of the body that is searched.
-std::uint16_t CrossingFinder::viewOf(std::uint32_t body, std::uint32_t face) {
-  const std::size_t run = face / simd::GROUP / GROUPS_VIEWED;
-  if (!viewed_[run]) {
-    const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
-    const std::size_t first = run * GROUPS_VIEWED, count = std::min(GROUPS_VIEWED, faces.level(0).groups - first);
-    simd::faceViews(search_.vertices, faces.leaves(false).vertices + first * 3 * simd::GROUP, count,
-                    views_.data() + first * simd::GROUP);
-    viewed_[run] = 1;
-  }
-  return views_[face];
-}
-
-/// Seen along some axis, the faces at the vertex lie around it once: no two of them meet but in what they share.
-bool CrossingFinder::isOneTurn(std::uint32_t body, const Neighbourhood& around, std::size_t vertex) {
-  static constexpr std::uint32_t SPREAD[8] = {0x000000, 0x000001, 0x000100, 0x000101,
-                                              0x010000, 0x010001, 0x010100, 0x010101};  // a bit into a byte
-  constexpr std::uint32_t MOST_FACES = 255;                                             // that a byte counts
-  const std::uint32_t first = around.faces.begin[vertex], last = around.faces.begin[vertex + 1];
-  if (!around.closed[vertex] || last - first > MOST_FACES) return false;
-  unsigned turns = simd::RISES - 1;
-  std::uint32_t rises = 0;  // a byte for each axis
-  for (std::uint32_t i = first; i < last; ++i) {
-    const unsigned view = viewOf(body, around.faces.slots[i]);
-    turns &= view;
-    rises += SPREAD[view / simd::RISES >> (3 * around.corner[i]) & 7];
-  }
-  turns |= turns / simd::TURNS_RIGHT;
-  for (int k = 0; k < 3; ++k) {
-    if ((turns >> k & 1) != 0 && (rises >> (8 * k) & 0xff) == 1) return true;
-  }
-  return false;
-}
-
-/// The edges opposite the vertex, of the faces at it, against those faces at it that share no edge with theirs.
+/// Pairs of faces at the vertex that share no edge, of which the edges opposite the vertex are asked about.
 void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex) {
   const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
-  const std::uint32_t first = around.faces.begin[vertex], last = around.faces.begin[vertex + 1];
-  const auto opposite = [&](std::uint32_t i) {
-    const Index* face = faces.feature(around.faces.slots[i]);
-    return std::array<Index, 2>{face[(around.corner[i] + 1u) % 3], face[(around.corner[i] + 2u) % 3]};
-  };
-  fan_.resize(last - first);
-  for (std::uint32_t i = first; i < last; ++i) fan_[i - first] = opposite(i);
-  const Index at = search_.scene->bodies()[body].internal_begin + static_cast<Index>(vertex);
-  for (std::uint32_t i = first; i < last; ++i) {
-    const std::uint32_t edge = around.own_edges[around.faces.slots[i]][(around.corner[i] + 1u) % 3];
-    if (edge == NO_INDEX) continue;
-    const auto [from, to] = fan_[i - first];
-    for (std::uint32_t j = first; j < last; ++j) {
-      const auto [x, y] = fan_[j - first];
-      if ((from == x) | (from == y) | (to == x) | (to == y)) continue;
-      ++tested_;
-      add({body, edge, body, around.faces.slots[j]}, {from, to, at, x, y});
+  const std::uint32_t first = around.faces.begin[vertex], n = around.faces.begin[vertex + 1] - first;
+  fan_.resize(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t slot = around.faces.slots[first + i], k = after(around.corner[first + i]);
+    const Index* face = faces.feature(slot);
+    fan_[i] = {slot, around.owns[slot] & 1u << k, face[k], face[after(k)]};
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    if (fan_slots_.size() < 2 * (fan_pairs_ + n)) {  // the last one to grow, should memory end
+      fan_asked_.resize(2 * (fan_pairs_ + n));
+      fan_slots_.resize(2 * fan_asked_.size());
+    }
+    const FaceOfFan& one = fan_[i];
+    for (std::uint32_t j = i + 1; j < n; ++j) {  // without a branch on what nothing foretells
+      const FaceOfFan& other = fan_[j];
+      const unsigned asked = one.edge | other.edge << simd::SECOND_EDGES_SHIFT;
+      fan_slots_[2 * fan_pairs_] = one.slot;
+      fan_slots_[2 * fan_pairs_ + 1] = other.slot;
+      fan_asked_[fan_pairs_] = static_cast<std::uint8_t>(asked);
+      fan_pairs_ += (asked != 0) & (one.from != other.from) & (one.from != other.to) & (one.to != other.from) &
+                    (one.to != other.to);
     }
   }
 }
 
+/// As flush() does.
+bool CrossingFinder::flushFans(std::uint32_t body, std::vector<EdgeFace>& found) {
+  for (std::size_t first = 0; first < fan_pairs_; first += CHUNK) {
+    const std::size_t n = std::min(CHUNK, fan_pairs_ - first);
+    for (std::size_t i = first; i < first + n; ++i)
+      tested_ += static_cast<std::size_t>(__builtin_popcount(fan_asked_[i]));
+    addFacePairs(body, body, fan_slots_.data() + 2 * first, n, fan_asked_.data() + first, found);
+    if (!flush(found)) return false;
+  }
+  fan_pairs_ = 0;
+  return goesOn(found);
+}
+
 bool CrossingFinder::searchFans(std::uint32_t body, std::size_t first, std::size_t last, std::vector<EdgeFace>& found) {
   work_ = 0;
-  const std::size_t groups = search_.scene->bodies()[body].tree(FeatureKind::FACE).level(0).groups;
-  const std::size_t runs = (groups + GROUPS_VIEWED - 1) / GROUPS_VIEWED;
-  if (viewed_.size() != runs || viewed_body_ != body) {
-    viewed_.assign(runs, 0);
-    views_.resize(groups * simd::GROUP);
-    viewed_body_ = body;
-  }
+  fan_pairs_ = 0;
   const Neighbourhood& around = (*search_.neighbourhoods)[body];
-  for (std::size_t vertex = first; vertex < last; ++vertex) {
-    if (!isOneTurn(body, around, vertex)) addFan(body, around, vertex);
-    if (pairs_.size() >= CHUNK && !flush(found)) return false;
+  const std::size_t vertices = around.faces.begin.size() - 1;
+  one_turn_.resize(last - first);
+  simd::fansOfOneTurn(search_.views, around.fans.view(), first, last - first, one_turn_.data());
+  other_turns_.clear();
+  for (std::size_t group = first; group < last; ++group) {
+    for (std::uint32_t left = ~std::uint32_t{one_turn_[group - first]} & 0xffff; left != 0; left &= left - 1) {
+      other_turns_.push_back(group * simd::GROUP + static_cast<std::size_t>(__builtin_ctz(left)));
+    }
   }
-  return flush(found);
+  while (!other_turns_.empty() && other_turns_.back() >= vertices) other_turns_.pop_back();
+  const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
+  for (std::size_t i = 0; i < other_turns_.size(); ++i) {
+    const std::size_t soon = other_turns_[std::min(i + FETCHED_AHEAD, other_turns_.size() - 1)];
+    for (std::uint32_t f = around.faces.begin[soon]; f < around.faces.begin[soon + 1]; ++f) {
+      __builtin_prefetch(faces.feature(around.faces.slots[f]));
+    }
+    addFan(body, around, other_turns_[i]);
+    if (fan_pairs_ >= CHUNK && !flushFans(body, found)) return false;
+  }
+  return flushFans(body, found);
 }
 
 }  // namespace dccd

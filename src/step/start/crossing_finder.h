@@ -33,6 +33,7 @@ class CrossingFinder {
     const SceneArrays* scene = nullptr;
     const std::vector<Neighbourhood>* neighbourhoods = nullptr;
     simd::NearVertices vertices{nullptr, 0};  ///< at t=0; of bodies that are searched by faces
+    const std::uint32_t* views = nullptr;     ///< simd::faceViews() of a body that is searched with itself
     Deadline deadline;
     std::size_t most_found = 0;
   };
@@ -51,13 +52,20 @@ class CrossingFinder {
   bool searchFaces(std::uint32_t a, std::uint32_t b, const TreePair& trees, const std::uint32_t* group_pairs,
                    std::size_t count, std::vector<EdgeFace>& found);
   /// What that leaves out within a body: edges of faces that share one vertex with the other face. first, last: of the
-  /// body's used vertices.
+  /// body's groups of used vertices.
   bool searchFans(std::uint32_t body, std::size_t first, std::size_t last, std::vector<EdgeFace>& found);
 
   /// Pairs of an edge and a face that were looked at since begin().
   std::uint64_t tested() const { return tested_; }
 
  private:
+  /// A face at a vertex, the bit of its edge opposite the vertex if the face stands for that, and from where to where
+  /// it goes.
+  struct FaceOfFan {
+    std::uint32_t slot;
+    unsigned edge;
+    Index from, to;
+  };
   bool goesOn(const std::vector<EdgeFace>& found);
   void add(const EdgeFace& pair, const std::array<std::uint32_t, 5>& corners) {
     pairs_.push_back(pair);
@@ -66,9 +74,10 @@ class CrossingFinder {
   void add(const SceneArrays& scene, const EdgeFace& pair);
   void test(const double* positions, std::size_t first, std::size_t last, std::vector<EdgeFace>& found);
   bool flush(std::vector<EdgeFace>& found);
-  bool isOneTurn(std::uint32_t body, const Neighbourhood& around, std::size_t vertex);
+  bool flushFans(std::uint32_t body, std::vector<EdgeFace>& found);
+  std::size_t addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
+                           const std::uint8_t* asked, std::vector<EdgeFace>& found);
   void addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex);
-  std::uint16_t viewOf(std::uint32_t body, std::uint32_t face);
 
   Search search_;
   std::uint64_t tested_ = 0;
@@ -77,12 +86,13 @@ class CrossingFinder {
   std::vector<EdgeFace> pairs_;                        // to be tested together,
   std::vector<std::array<std::uint32_t, 5>> corners_;  // the vertices of each,
   std::vector<std::uint8_t> meet_;                     // and whether it meets
-  std::vector<std::uint8_t> edges_;                    // of pairs of faces those that may meet the other,
-  std::vector<std::uint32_t> crossing_;                // and those pairs with any
-  std::vector<std::array<Index, 2>> fan_;              // of the faces at a vertex, the edges opposite it
-  std::uint32_t viewed_body_ = 0;
-  std::vector<std::uint16_t> views_;  // of its faces,
-  std::vector<std::uint8_t> viewed_;  // of those runs of groups that were looked at
+  std::vector<std::uint32_t> face_pairs_;              // that simd::facePairFilter() left
+  std::vector<FaceOfFan> fan_;                         // the faces at a vertex,
+  std::vector<std::uint32_t> fan_slots_;               // pairs of such,
+  std::vector<std::uint8_t> fan_asked_;                // and which of their edges are asked about; of these
+  std::size_t fan_pairs_ = 0;                          // are there
+  std::vector<std::uint16_t> one_turn_;                // simd::fansOfOneTurn(),
+  std::vector<std::size_t> other_turns_;               // and the vertices of which that is not known
 };
 
 }  // namespace dccd

@@ -46,7 +46,32 @@ void FacesSharing::build(const ClusterTree& faces, const SlotsAtVertex& at, Inde
   others.resize(others.size() + 8);
 }
 
-void Neighbourhood::learn(const SceneBody& body) {
+void Fans::build(const SlotsAtVertex& faces, const std::vector<std::uint8_t>& corner,
+                 const std::vector<std::uint8_t>& closed, std::size_t slots) {
+  constexpr std::uint32_t MOST_ROWS = 255, CORNERS = 4;
+  const std::size_t vertices = closed.size();
+  begin.assign(1, 0);
+  corners.clear();
+  for (std::size_t first = 0; first < vertices; first += simd::GROUP) {
+    const std::size_t own = corners.size(), last = std::min(first + simd::GROUP, vertices);
+    for (std::size_t v = first; v < last; ++v) {
+      const std::uint32_t at = faces.begin[v], n = faces.begin[v + 1] - at;
+      const bool known = closed[v] && n <= MOST_ROWS;
+      const std::size_t rows = known ? n : 1;
+      if (corners.size() < own + rows * simd::GROUP) {
+        corners.resize(own + rows * simd::GROUP, static_cast<std::uint32_t>(CORNERS * slots));
+      }
+      std::uint32_t* lane = corners.data() + own + v % simd::GROUP;
+      if (!known) *lane = static_cast<std::uint32_t>(CORNERS * (slots + 1));
+      for (std::uint32_t i = 0; known && i < n; ++i)
+        lane[i * simd::GROUP] = CORNERS * faces.slots[at + i] + corner[at + i];
+    }
+    begin.push_back(static_cast<std::uint32_t>(corners.size() / simd::GROUP));
+  }
+}
+
+void Neighbourhood::learn(const SceneArrays& scene, std::size_t body_index) {
+  const SceneBody& body = scene.bodies()[body_index];
   internal_of_local.assign(body.setup.topology->vertexCount(), NO_INDEX);
   for (std::size_t i = 0; i < body.usedCount(); ++i) {
     internal_of_local[body.slot_vertex[i]] = body.internal_begin + static_cast<Index>(i);
@@ -62,7 +87,8 @@ void Neighbourhood::learn(const SceneBody& body) {
     }
   }
   own_edges.assign(face_tree.featureCount(), {NO_INDEX, NO_INDEX, NO_INDEX});
-  closed.assign(body.usedCount(), 1);
+  // Per used vertex: each edge at it is on two faces, which pass along it in opposite directions.
+  std::vector<std::uint8_t> closed(body.usedCount(), 1);
   for (std::uint32_t slot = 0; slot < edge_tree.featureCount(); ++slot) {
     const Index* e = edge_tree.feature(slot);
     const Index at = e[0] - body.internal_begin;
@@ -82,7 +108,14 @@ void Neighbourhood::learn(const SceneBody& body) {
     if (own) *own = slot;
     if (along != 1 || against != 1) closed[at] = closed[e[1] - body.internal_begin] = 0;
   }
-  if (meetsItself(body.setup)) sharing.build(face_tree, faces, body.internal_begin);
+  if (meetsItself(body.setup)) {
+    sharing.build(face_tree, faces, body.internal_begin);
+    fans.build(faces, corner, closed, face_tree.level(0).groups * simd::GROUP);
+  }
+  listed.resize(body.rank(FeatureKind::FACE).size());
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    scene.featureVertices(FeatureKind::FACE, body_index, body.face_begin + static_cast<Index>(i), listed[i].data());
+  }
   owns.clear();
   for (const std::array<std::uint32_t, 3>& own : own_edges) {
     owns.push_back(

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "culling/scene_arrays.h"
+#include "simd/face_filter.h"
 
 namespace dccd {
 
@@ -23,6 +24,15 @@ struct FacesSharing {
   simd::KnownPairs view() const { return {begin.data(), others.data(), pairs.data()}; }
 };
 
+/// simd::FansView of a body's used vertices. Where an edge at the vertex is not on two faces, which pass along it in
+/// opposite directions, a slot of the view 0 stands for all of them.
+struct Fans {
+  std::vector<std::uint32_t> begin, corners;
+  void build(const SlotsAtVertex& faces, const std::vector<std::uint8_t>& corner,
+             const std::vector<std::uint8_t>& closed, std::size_t slots);
+  simd::FansView view() const { return {begin.data(), corners.data()}; }
+};
+
 struct Neighbourhood {
   std::vector<Index> internal_of_local;
   SlotsAtVertex edges, faces;
@@ -32,12 +42,12 @@ struct Neighbourhood {
   std::vector<std::uint8_t> owns;  ///< by slots of faces: bit k where the k-th of these is one
   /// Of each of faces.slots, which of the face's corners the vertex is.
   std::vector<std::uint8_t> corner;
-  /// Per used vertex: each edge at it is on two faces, which pass along it in opposite directions.
-  std::vector<std::uint8_t> closed;
+  std::vector<Face> listed;  ///< by ranks from the body's first face's on: SceneArrays::featureVertices()
 
-  FacesSharing sharing;  ///< of a body that meets itself
+  FacesSharing sharing;  ///< of a body that meets itself,
+  Fans fans;             ///< whose slots are those of all groups of faces, and two more: of the views TURNS and 0
 
-  void learn(const SceneBody& body);
+  void learn(const SceneArrays& scene, std::size_t body_index);
 };
 
 inline bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }

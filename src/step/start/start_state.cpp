@@ -15,11 +15,12 @@ namespace {
 constexpr std::size_t CANDIDATES_PER_100_EDGES = 40, CANDIDATES_PER_100_EDGES_WITH_DEADLINE = 100;
 constexpr std::size_t FEW_CANDIDATES = 4096;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
-constexpr std::size_t FAN_UNIT = 1024;             // vertices of a unit
+constexpr std::size_t FAN_UNIT = 64;               // groups of vertices of a unit
 constexpr std::size_t UNITS_A_THREAD = 4;          // between two looks at the clock
 constexpr std::size_t LISTED_AHEAD = 16;           // pairs whose faces are fetched before they are listed
 constexpr std::size_t LISTED_PIECE = 4096;         // pairs that a thread lists at once
 constexpr std::size_t NEAR_PIECE = 4096;           // vertices that a thread moves near at once
+constexpr std::size_t VIEWED_PIECE = 256;          // groups of faces that a thread looks at once
 constexpr std::size_t PIECE = 4;                   // units that a thread takes at once
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
@@ -109,11 +110,14 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
     for (std::size_t i = first; i < last; ++i) {
       const auto edge = static_cast<Index>(keys_[i] >> shift), face = static_cast<Index>(keys_[i] & faces);
       const std::uint64_t soon = keys_[std::min(i + LISTED_AHEAD, last - 1)];
-      scene.prefetchFeature(FeatureKind::FACE, body[1], static_cast<Index>(soon & faces));
+      const std::size_t listed_soon = (soon & faces) - bodies[body[1]].face_begin;
+      const std::vector<Face>& listed = neighbourhoods_[body[1]].listed;
+      if (listed_soon < listed.size()) __builtin_prefetch(&listed[listed_soon]);
       body = {bodyOf(&SceneBody::edge_begin, edge, body[0]), bodyOf(&SceneBody::face_begin, face, body[1])};
       out[i].body = body;
       scene.featureVertices(FeatureKind::EDGE, body[0], edge, out[i].vertex.data());
-      scene.featureVertices(FeatureKind::FACE, body[1], face, out[i].vertex.data() + 2);
+      const Face& of_face = neighbourhoods_[body[1]].listed[face - bodies[body[1]].face_begin];
+      std::copy(of_face.begin(), of_face.end(), out[i].vertex.begin() + 2);
     }
   });
 }
@@ -225,6 +229,17 @@ void StartStateSearch::moveNear(const SceneArrays& scene, const Parallel& parall
   }
 }
 
+void StartStateSearch::viewFaces(const ClusterTree& faces, const Parallel& parallel) {
+  const std::size_t groups = faces.level(0).groups, slots = groups * simd::GROUP;
+  views_.resize(slots + 2);
+  views_[slots] = simd::TURNS;
+  views_[slots + 1] = 0;
+  parallel(groups, VIEWED_PIECE, [&](std::size_t first, std::size_t last) {
+    simd::faceViews({near_.data(), largest_near_}, faces.leaves(false).vertices + first * 3 * simd::GROUP, last - first,
+                    views_.data() + first * simd::GROUP);
+  });
+}
+
 /// From next_unit_ on.
 void StartStateSearch::setUnits(std::size_t fans) {
   fans_ = static_cast<std::uint32_t>(fans);
@@ -251,7 +266,7 @@ bool StartStateSearch::searchUnit(CrossingFinder& finder, const TreePair& trees,
                                   std::vector<EdgeFace>& found) const {
   const std::uint32_t a = next_bodies_[0], b = next_bodies_[1], number = unit_number_[unit];
   if (number < fans_) {
-    const std::size_t first = number * FAN_UNIT, end = neighbourhoods_[a].closed.size();
+    const std::size_t first = number * FAN_UNIT, end = neighbourhoods_[a].fans.begin.size() - 1;
     return finder.searchFans(a, first, std::min(first + FAN_UNIT, end), found);
   }
   const std::uint32_t* groups = by_group_[unit_begin_[unit]].data();
@@ -282,9 +297,12 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   const simd::KnownPairs sharing = neighbourhoods_[a].sharing.view();
   if (trees.self) trees.sharing = &sharing;
   cut_ = superclusterPairs(trees, groups_, scratch_, most_group_pairs_).toc <= 1 || cut_;
-  setUnits(trees.self ? (scene.bodies()[a].usedCount() + FAN_UNIT - 1) / FAN_UNIT : 0);
+  const std::size_t fan_groups = trees.self ? neighbourhoods_[a].fans.begin.size() - 1 : 0;
+  setUnits((fan_groups + FAN_UNIT - 1) / FAN_UNIT);
+  if (next_unit_ < fans_) viewFaces(*trees.a, parallel);
   const bool limited = deadline.canEnd() || most_found_ != FoundLimit::NONE;
   const std::size_t count = unit_number_.size(), block = !limited ? count : threads == 1 ? 1 : UNITS_A_THREAD * threads;
+  const bool alone = threads == 1;  // what is found goes to its place at once
   for (std::size_t first = 0; first < count; first += block) {
     next_unit_ = unit_number_[first];
     // The first group goes with the last fans: of a small body both are one unit.
@@ -298,12 +316,13 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
       finder.begin({&scene,
                     &neighbourhoods_,
                     {near_.data(), largest_near_},
+                    views_.data(),
                     beforeListing(deadline),
-                    most_found_ - found_.size()});
+                    alone ? most_found_ : most_found_ - found_.size()});
       for (std::size_t i = from; i < to; ++i) {
         unit_found_[i].clear();
         const std::uint64_t before = finder.tested();
-        unit_whole_[i] = searchUnit(finder, trees, first + i, unit_found_[i]);
+        unit_whole_[i] = searchUnit(finder, trees, first + i, alone ? found_ : unit_found_[i]);
         unit_tested_[i] = finder.tested() - before;
       }
     });
@@ -378,8 +397,9 @@ void StartStateSearch::addFacesAtEdge(const SceneArrays& scene, std::uint32_t ed
 
 void StartStateSearch::learnNeighbourhoods(const SceneArrays& scene) {
   if (!neighbourhoods_.empty()) return;
-  neighbourhoods_.resize(scene.bodies().size());
-  for (std::size_t b = 0; b < neighbourhoods_.size(); ++b) neighbourhoods_[b].learn(scene.bodies()[b]);
+  std::vector<Neighbourhood> learnt(scene.bodies().size());
+  for (std::size_t b = 0; b < learnt.size(); ++b) learnt[b].learn(scene, b);
+  neighbourhoods_ = std::move(learnt);
 }
 
 void StartStateSearch::clear() {

@@ -120,6 +120,7 @@ class StartStateSearch {
   void search(const SceneArrays& scene, const Deadline& deadline, std::size_t threads, const Parallel& parallel);
   bool searchBodies(const SceneArrays& scene, const Deadline& deadline, std::size_t threads, const Parallel& parallel);
   void moveNear(const SceneArrays& scene, const Parallel& parallel);
+  void viewFaces(const ClusterTree& faces, const Parallel& parallel);
   void setUnits(std::size_t fans);
   bool searchUnit(CrossingFinder& finder, const TreePair& trees, std::size_t unit, std::vector<EdgeFace>& found) const;
   void list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out,
@@ -141,6 +142,7 @@ class StartStateSearch {
   std::vector<std::uint8_t> by_faces_;  // per body, by which it is searched
   std::vector<float> near_;             // vertices at t=0, of such bodies: simd::NearVertices,
   float largest_near_ = 0;
+  std::vector<std::uint32_t> views_;  // simd::faceViews() of the body that is searched with itself
   std::vector<Touched> touched_;      // of the last step; after run() those that the deadline left
   std::vector<EdgeFace> candidates_;  // to be looked at; after run() those that the deadline left
   std::vector<EdgeFace> found_;
