@@ -54,6 +54,8 @@ if os.environ.get('DEFORMABLE_CCD_IN_BARE_ROOT'):
     del NOT_RUN['cmake -S . -B build-core']
 if os.environ.get('DEFORMABLE_CCD_SANITIZED'):
     NOT_RUN['rosrun nodelet'] = "a library built with a sanitizer cannot be loaded by ROS's own program; nodelet.test loads it"
+# Of each example that follows the monitor: a topic of its own, and what it says there.
+CLIENTS = {'stop_the_arm': ('/stop_the_arm/stop', 'data: (True|False)'), 'slow_the_arm': ('/slow_the_arm/scale', r'data: [\d.]+')}
 # What stands for a value of the reader's in a command, and what is put there.
 PLACEHOLDERS = {'FILE': None, 'v,a,b,c': '100,0,1,30', 'v,x,y,z': '0,32768,32768,32768'}
 
@@ -304,23 +306,16 @@ class CommandsTest(unittest.TestCase):
             finally:
                 stop(launched)
                 self.gone('/collision_monitor/clear')
-        if words[:3] in (['rosrun', 'deformable_ccd', 'stop_the_arm'], ['rosrun', 'deformable_ccd', 'stop_the_arm.py']):
+        client = CLIENTS.get(words[2].replace('.py', '')) if words[:2] == ['rosrun', 'deformable_ccd'] else None
+        if client:
+            topic, said = client
             self.with_a_monitor()
-            client = self.start(command)
+            process = self.start(command)
             try:
-                said = self.runs('timeout 40 rostopic echo -n 1 /stop_the_arm/stop', 60)
-                return self.assertRegex(said, 'data: (True|False)')
+                return self.assertRegex(self.runs('timeout 40 rostopic echo -n 1 ' + topic, 60), said)
             finally:
-                stop(client)
-                self.gone('/stop_the_arm/stop')
-        if words[:3] in (['rosrun', 'deformable_ccd', 'slow_the_arm'], ['rosrun', 'deformable_ccd', 'slow_the_arm.py']):
-            self.with_a_monitor()
-            client = self.start(command)
-            try:
-                return self.assertRegex(self.runs('timeout 40 rostopic echo -n 1 /slow_the_arm/scale', 60), r'data: [\d.]+')
-            finally:
-                stop(client)
-                self.gone('/slow_the_arm/scale')
+                stop(process)
+                self.gone(topic)
         if words[:3] == ['rosrun', 'deformable_ccd', 'publish_cloth.py']:
             tracker = self.start(command)
             try:
