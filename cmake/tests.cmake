@@ -44,17 +44,32 @@ if(rapidcheck_FOUND)
   target_link_libraries(deformable_ccd_test_support PUBLIC rapidcheck)
 endif()
 
+# The tests' own code is compiled as cold code: what takes their time is in the libraries. One set of headers is compiled for
+# the core's tests, one for those of the node. All that reads a set has the same options, of which a library's and a program's
+# are told to be position-independent in different ways, so that the compiler's default serves both.
+function(set_test_options name)
+  target_compile_options(${name} PRIVATE ${COLD_CODE})
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+endfunction()
+set_test_options(deformable_ccd_test_support)
+target_precompile_headers(deformable_ccd_test_support PRIVATE
+  <gtest/gtest.h> <random> ${COMMON_HEADERS} <oracle/oracle.h> <dccd/stream.h>)
+
 # Adds the gtest binary NAME from the given files, linked with LIBRARIES: the core's archive, or a library on the core.
-# HEADERS are those that most of its files read.
+# HEADERS_OF is the target whose compiled headers it reads, the test support if there is none.
 function(add_gtest_suite name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES;HEADERS" ${ARGN})
+  cmake_parse_arguments(arg "" "HEADERS_OF" "SOURCES;LIBRARIES" ${ARGN})
   if(NOT arg_SOURCES)
     return()
   endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE deformable_ccd_test_support ${arg_LIBRARIES} GTest::gtest_main)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/gtest)
-  target_precompile_headers(${name} PRIVATE ${arg_HEADERS} <gtest/gtest.h> ${COMMON_HEADERS})
+  set_test_options(${name})
+  if(NOT arg_HEADERS_OF)
+    set(arg_HEADERS_OF deformable_ccd_test_support)
+  endif()
+  target_precompile_headers(${name} REUSE_FROM ${arg_HEADERS_OF})
   file(APPEND ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "${name}\n")
   add_test(NAME ${name} COMMAND ${name})
   if(NOT DEFORMABLE_CCD_CORE_ONLY)
@@ -94,7 +109,7 @@ endforeach()
 file(GLOB PAPER_TESTS CONFIGURE_DEPENDS paper/test/*.cpp)
 add_gtest_suite(paper_tests SOURCES ${PAPER_TESTS} LIBRARIES deformable_ccd_paper deformable_ccd_archive)
 if(TARGET deformable_ccd_report)
-  add_gtest_suite(report_tests HEADERS <nlohmann/json.hpp> SOURCES ${report_SOURCES} LIBRARIES deformable_ccd_report deformable_ccd)
+  add_gtest_suite(report_tests SOURCES ${report_SOURCES} LIBRARIES deformable_ccd_report deformable_ccd)
 endif()
 
 if(DEFORMABLE_CCD_CORE_ONLY)
@@ -108,7 +123,18 @@ set_source_files_properties(test/unit/ros/mesh_file_differential_test.cpp PROPER
 # Another one holds a robot's links beside KDL.
 find_library(KDL_PARSER_LIBRARY kdl_parser REQUIRED)
 find_library(KDL_LIBRARY orocos-kdl REQUIRED)
-add_gtest_suite(ros_tests HEADERS <ros/ros.h> SOURCES ${ros_SOURCES}
+file(GLOB LIVE_SUPPORT_SOURCES CONFIGURE_DEPENDS test/ros/support/*.cpp)
+add_library(deformable_ccd_live_support STATIC EXCLUDE_FROM_ALL ${LIVE_SUPPORT_SOURCES})
+add_dependencies(deformable_ccd_live_support ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
+set_test_options(deformable_ccd_live_support)
+target_include_directories(deformable_ccd_live_support SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
+target_link_libraries(deformable_ccd_live_support PUBLIC ${ROS_LINK_LIBRARIES} deformable_ccd_test_support)
+target_precompile_headers(deformable_ccd_live_support PRIVATE <gtest/gtest.h> <ros/ros.h> <sensor_msgs/PointCloud2.h>
+  <visualization_msgs/MarkerArray.h> ${COMMON_HEADERS} <node/monitor_pipeline.h>)
+# Two tests are about the order in which headers are read.
+set_source_files_properties(test/unit/ros/include_order_core_first_test.cpp test/unit/ros/include_order_messages_first_test.cpp
+  PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES}
   LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY} ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
 # scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.
@@ -130,15 +156,16 @@ if(CATKIN_ENABLE_TESTING)
   # Each test/ros/NAME_test.cpp, with what lies in test/ros/NAME/, is the executable NAME_test, started by one or more of
   # test/ros/*.test.
   file(GLOB ROSTEST_SOURCES CONFIGURE_DEPENDS test/ros/*_test.cpp)
-  file(GLOB ROSTEST_SUPPORT CONFIGURE_DEPENDS test/ros/support/*.cpp)
   foreach(source ${ROSTEST_SOURCES})
     get_filename_component(name ${source} NAME_WE)
     string(REGEX REPLACE "_test$" "" part ${name})
     file(GLOB part_sources CONFIGURE_DEPENDS test/ros/${part}/*_test.cpp)
-    add_executable(${name} EXCLUDE_FROM_ALL ${source} ${part_sources} ${ROSTEST_SUPPORT})
+    add_executable(${name} EXCLUDE_FROM_ALL ${source} ${part_sources})
     add_dependencies(${name} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
     target_include_directories(${name} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
-    target_link_libraries(${name} ${ROS_LINK_LIBRARIES} deformable_ccd_test_support GTest::gtest_main)
+    target_link_libraries(${name} deformable_ccd_live_support GTest::gtest_main)
+    set_test_options(${name})
+    target_precompile_headers(${name} REUSE_FROM deformable_ccd_live_support)
     add_dependencies(tests ${name})
     list(APPEND ROSTEST_EXECUTABLES ${name})
   endforeach()

@@ -98,9 +98,9 @@ TEST(AccuracyErrors, MissedFalseUndecidedAndTheErrorOfEitherEnd) {
 }
 
 TEST(AccuracyErrors, TheWidthOfTheCellsCounts) {
-  EXPECT_EQ(tocError({0.25, 0.5}, {0.25, 0.5}), 0.25) << "the time may be at the other end";
-  EXPECT_EQ(tocError({0, 1}, {0.25, 0.25}), 0.75);
-  EXPECT_EQ(tocError({0.5, 0.5}, {0.25, 0.375}), 0.25);
+  EXPECT_EQ(dccd::tocError({0.25, 0.5}, {0.25, 0.5}), 0.25) << "the time may be at the other end";
+  EXPECT_EQ(dccd::tocError({0, 1}, {0.25, 0.25}), 0.75);
+  EXPECT_EQ(dccd::tocError({0.5, 0.5}, {0.25, 0.375}), 0.25);
 }
 
 TEST(MedianOf, OrderStatisticsOfKnownValues) {

@@ -97,6 +97,8 @@ class BareRoot:
         for path in pathlib.Path('/etc/apt/apt.conf.d').glob('*'):
             if 'proxy' in path.read_text(errors='replace').lower():
                 shutil.copy(path, self.folder / 'etc/apt/apt.conf.d')
+        # A root that is thrown away need not survive a power cut; Debian's container images say so, too.
+        (self.folder / 'etc/dpkg/dpkg.cfg.d/unsafe-io').write_text('force-unsafe-io\n')
         if self.run('true').returncode != 0:
             raise CannotMake('this machine may not mount /proc for a root')
 

@@ -8,6 +8,7 @@ README's first command with all others of the pages in a bare root.
 The last line printed is `N passed, N failed, N skipped`.
 """
 import argparse
+import collections
 import concurrent.futures
 import os
 import pathlib
@@ -43,6 +44,8 @@ def find_runners(arguments):
                  for name in (arguments.fuzzers / 'fuzz_targets.txt').read_text().split()]
     python = [PythonRunner(p) for p in sorted((CHECKOUT / 'test').rglob('*_test.py'))
               if 'ros' not in p.relative_to(CHECKOUT / 'test').parts]
+    on_live_nodes = [runner for runner in python if runner.path.parent.name in ('attacks', 'faults')]
+    python = [runner for runner in python if runner not in on_live_nodes]
     launch = [LaunchCheckRunner(p) for p in sorted((CHECKOUT / 'launch').rglob('*.launch'))]
     live = [RostestRunner(p) for p in sorted((CHECKOUT / 'test' / 'ros').glob('*.test'))]
     # In a bare root there is no root to be made, and a sanitizer looks at nothing that a stranger's build does.
@@ -51,7 +54,28 @@ def find_runners(arguments):
         python = [runner for runner in python if runner.name != PAGE_COMMANDS.name]
     if arguments.pages:
         python.append(PagesRunner(arguments.pages))
-    return busy + python, launch + live, [] if inside else [BareRootRunner()]
+    # The shards, which are short, come last, so that all cores are done at about the same time.
+    return python + busy, launch + live + on_live_nodes, [] if inside else [BareRootRunner()]
+
+
+def run_all(work, busy, live):
+    """Calls work(runner) for each of both lists, a thread a core. Live tests have deadlines of their own, so only one runs at a
+    time, beside those that compute; when they are done, their thread takes its share of the rest."""
+    busy, live = collections.deque(busy), collections.deque(live)
+
+    def take(queues):
+        for queue in queues:
+            while True:
+                try:
+                    runner = queue.popleft()
+                except IndexError:
+                    break
+                work(runner)
+
+    threads = os.cpu_count() or 1
+    with concurrent.futures.ThreadPoolExecutor(threads) as pool:
+        for future in [pool.submit(take, [live, busy] if i == 0 else [busy]) for i in range(threads)]:
+            future.result()
 
 
 def main():
@@ -91,11 +115,7 @@ def main():
             total.skipped += result.skipped
 
     busy, live, alone = [[r for r in group if arguments.only in r.name] for group in find_runners(arguments)]
-    # Live tests have deadlines of their own, so only one runs at a time, beside one that computes.
-    with concurrent.futures.ThreadPoolExecutor(1) as live_pool, \
-            concurrent.futures.ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - (1 if live else 0))) as busy_pool:
-        pending = [live_pool.submit(work, r) for r in live] + [busy_pool.submit(work, r) for r in busy]
-        concurrent.futures.wait(pending)
+    run_all(work, busy, live)
     for runner in alone:
         work(runner)
     reports = os.environ.get('DEFORMABLE_CCD_SANITIZER_REPORTS')

@@ -1,24 +1,16 @@
 """check_step says "nothing touches" only where that is proved, else why not, and its exit status tells the two apart."""
 import json
 import math
-import os
 import pathlib
 import re
 import subprocess
 import tempfile
 import unittest
 
-from checkout import CHECKOUT
+from checkout import CHECKOUT, TOOLS
 
 NOT_PROVED = 3
-
-
-def tool():
-    for prefix in os.environ['CMAKE_PREFIX_PATH'].split(':'):
-        path = pathlib.Path(prefix) / 'lib/deformable_ccd/check_step'
-        if path.exists():
-            return str(path)
-    raise AssertionError('check_step was not built')
+TOOL = str(TOOLS / 'check_step')
 
 
 def write(path, points, faces):
@@ -47,17 +39,22 @@ class CheckStepTest(unittest.TestCase):
 
     FACES = faces_of() + faces_of(first=576)
 
-    def check(self, t0, t1, *flags):
+    def run_on(self, ending, write_frame, frames, *flags):
+        """write_frame(path, frame) for each of two frames, then the tool."""
         with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
-            write(folder / '0.ply', t0, self.FACES)
-            write(folder / '1.ply', t1, self.FACES)
-            done = subprocess.run([tool(), str(folder / '0.ply'), str(folder / '1.ply'), '--stats', str(folder / 'stats.json'),
-                                   *flags], capture_output=True, text=True)
-            self.assertEqual(done.stderr, '')
-            self.stats = json.loads((folder / 'stats.json').read_text())
-        self.said = done.stdout
+            paths = [pathlib.Path(folder) / (name + ending) for name in '01']
+            for path, frame in zip(paths, frames):
+                write_frame(path, frame)
+            stats = pathlib.Path(folder) / 'stats.json'
+            done = subprocess.run([TOOL, *map(str, paths), '--stats', str(stats), *flags], capture_output=True, text=True)
+            self.stats = json.loads(stats.read_text())
+        self.said, self.remarked = done.stdout, done.stderr
         return done.returncode
+
+    def check(self, t0, t1, *flags):
+        status = self.run_on('.ply', lambda path, points: write(path, points, self.FACES), (t0, t1), *flags)
+        self.assertEqual(self.remarked, '')
+        return status
 
     def test_nothing_touches(self):
         self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(0.05)), 0)
@@ -89,7 +86,7 @@ class CheckStepTest(unittest.TestCase):
             files = [pathlib.Path(folder) / ('%d.ply' % k) for k in range(3)]
             for file, points in zip(files, (lost, *2 * [sheet(0) + sheet(0.1)])):
                 write(file, points, self.FACES)
-            self.assertEqual(subprocess.run([tool(), *map(str, files)], capture_output=True, text=True).returncode, NOT_PROVED)
+            self.assertEqual(subprocess.run([TOOL, *map(str, files)], capture_output=True, text=True).returncode, NOT_PROVED)
 
     def test_an_edge_through_a_face_at_the_start(self):
         through = [(x, y, 0.3 * (x - 0.111)) for x, y, _ in sheet(0)]
@@ -103,17 +100,9 @@ class CheckStepTest(unittest.TestCase):
 
     def obj(self, points, polygons, ends=None):
         """The step of an OBJ from the points to the ends."""
-        with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
-            for name, at in (('0.obj', points), ('1.obj', ends or points)):
-                (folder / name).write_text(''.join('v %r %r %r\n' % p for p in at) +
-                                           ''.join('f ' + ' '.join(str(v + 1) for v in polygon) + '\n' for polygon in polygons))
-            done = subprocess.run([tool(), str(folder / '0.obj'), str(folder / '1.obj'), '--stats', str(folder / 'stats.json')],
-                                  capture_output=True, text=True)
-            self.remarked = done.stderr
-            self.stats = json.loads((folder / 'stats.json').read_text())
-        self.said = done.stdout
-        return done.returncode
+        faces = ''.join('f ' + ' '.join(str(v + 1) for v in polygon) + '\n' for polygon in polygons)
+        return self.run_on('.obj', lambda path, at: path.write_text(''.join('v %r %r %r\n' % p for p in at) + faces),
+                           (points, ends or points))
 
     def test_a_chip_falls_through_the_notch_of_an_l(self):
         outline = [(3, 0), (3, 1), (1, 1), (1, 3), (0, 3), (0, 0)]
@@ -139,9 +128,9 @@ class CheckStepTest(unittest.TestCase):
             self.assertNotIn('nothing touches', self.said)
 
     def test_errors_are_told_from_what_is_not_proved(self):
-        done = subprocess.run([tool(), 'nowhere.ply', 'nowhere.ply'], capture_output=True, text=True)
+        done = subprocess.run([TOOL, 'nowhere.ply', 'nowhere.ply'], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
-        self.assertEqual(subprocess.run([tool(), '--no-such-flag'], capture_output=True).returncode, 1)
+        self.assertEqual(subprocess.run([TOOL, '--no-such-flag'], capture_output=True).returncode, 1)
 
 
 OBJ_TRIANGLES = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 %(z)s\nv 0.3 0.2 %(z)s\nv 0.2 0.3 %(z)s\n%(faces)s'
@@ -158,7 +147,7 @@ class Files(unittest.TestCase):
             for frame, text in zip(frames, (first, second)):
                 frame.write_text(text)
             csv = pathlib.Path(folder) / 'contacts.csv'
-            done = subprocess.run([tool(), *map(str, frames), '--contacts', str(csv)], capture_output=True, text=True)
+            done = subprocess.run([TOOL, *map(str, frames), '--contacts', str(csv)], capture_output=True, text=True)
             self.said, self.remarks = done.stdout, done.stderr.replace(folder + '/', '')
             rows = csv.read_text().splitlines()[1:] if csv.exists() else []
         self.contacts = []
@@ -249,7 +238,7 @@ class SoupsTest(Files):
         with tempfile.TemporaryDirectory() as folder:
             (pathlib.Path(folder) / '0.stl').write_text(stl(*self.FLOOR))
             write(pathlib.Path(folder) / '1.ply', [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (2, 1, 3)])
-            done = subprocess.run([tool(), folder + '/0.stl', folder + '/1.ply'], capture_output=True, text=True)
+            done = subprocess.run([TOOL, folder + '/0.stl', folder + '/1.ply'], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1)
             self.assertIn('write all frames in one format', done.stderr)
 
@@ -280,7 +269,7 @@ class SequenceTest(unittest.TestCase):
             frames = [str(folder / ('%d.ply' % k)) for k in self.ORDER]
 
             def run(frames, *flags):
-                done = subprocess.run([tool(), *frames, '--contacts', str(folder / 'out.csv'), '--stats', str(folder / 'out.json'),
+                done = subprocess.run([TOOL, *frames, '--contacts', str(folder / 'out.csv'), '--stats', str(folder / 'out.json'),
                                        *flags], capture_output=True, text=True)
                 self.assertEqual(done.stderr, '')
                 return (folder / 'out.csv').read_text(), json.loads((folder / 'out.json').read_text())
@@ -312,7 +301,7 @@ class SequenceTest(unittest.TestCase):
             for k in range(3):
                 n = self.N if k < 2 else 8
                 write(folder / ('%d.ply' % k), self.frame(k) if k < 2 else sheet(0, 8), faces_of(n))
-            done = subprocess.run([tool(), *(str(folder / ('%d.ply' % k)) for k in range(3))], capture_output=True, text=True)
+            done = subprocess.run([TOOL, *(str(folder / ('%d.ply' % k)) for k in range(3))], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1)
             self.assertIn('2.ply: not the topology of', done.stderr)
 

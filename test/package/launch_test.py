@@ -7,6 +7,7 @@ import unittest
 import xml.etree.ElementTree as ElementTree
 
 import rosgraph
+import roslaunch
 import yaml
 
 from checkout import CHECKOUT, TOOLS
@@ -59,18 +60,14 @@ class LaunchTest(unittest.TestCase):
         return 'params:=%s' % path
 
     def words(self, launch, *arguments):
-        """The monitor's command line."""
-        ran = subprocess.run(['roslaunch', '--args', NODE[:-1], str(CHECKOUT / 'launch' / launch), *arguments],
-                             env=self.environment, capture_output=True, text=True, check=False)
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        return set(ran.stdout.split())
+        """The monitor's command line, as `roslaunch --args` has it, without a process for each."""
+        return set(roslaunch.node_args.get_node_args(NODE[:-1], [(str(CHECKOUT / 'launch' / launch), list(arguments))]))
 
     def parameters(self, launch, *arguments):
         """Those of the monitor that roslaunch would set, topology/rows and the like as they stand there."""
-        ran = subprocess.run(['roslaunch', '--dump-params', str(CHECKOUT / 'launch' / launch), *arguments],
-                             env=self.environment, capture_output=True, text=True, check=False)
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        return {name[len(NODE):]: value for name, value in yaml.safe_load(ran.stdout).items() if name.startswith(NODE)}
+        config = roslaunch.config.ROSLaunchConfig()
+        roslaunch.xmlloader.XmlLoader().load(str(CHECKOUT / 'launch' / launch), config, argv=list(arguments), verbose=False)
+        return {name[len(NODE):]: param.value for name, param in config.params.items() if name.startswith(NODE)}
 
     def test_a_file_alone(self):
         for launch, defaults in DEFAULTS.items():

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+import threading
+import time
 import unittest
 import unittest.mock
 
@@ -103,6 +105,22 @@ class RunTestsTest(unittest.TestCase):
         result, _ = runners.PythonRunner(test)(self.path)
         self.assertGreater(result.failed, 0)
         self.assertEqual(result.passed, 0)
+
+    def test_live_tests_run_one_at_a_time_and_then_their_thread_helps(self):
+        meeting, ran, now, most = threading.Barrier(2), [], [], []
+
+        def work(runner):
+            ran.append(runner)
+            if runner == 'live':
+                now.append(runner)
+                most.append(len(now))
+                time.sleep(0.02)
+                now.pop()
+            elif runner == 'one of two':
+                meeting.wait(20)
+        with unittest.mock.patch.object(os, 'cpu_count', return_value=2):
+            run_tests.run_all(work, ['busy', 'one of two', 'one of two'], ['live'] * 3)
+        self.assertEqual((sorted(ran), most), (['busy', 'live', 'live', 'live', 'one of two', 'one of two'], [1, 1, 1]))
 
     def test_the_commands_of_the_pages_run_here_where_there_is_no_bare_root(self):
         (self.path / 'gtest_suites.txt').write_text('')

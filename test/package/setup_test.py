@@ -131,10 +131,15 @@ class SetupTest(Machine):
     def test_unknown_argument(self):
         self.expect_one_line(self.setup_script('--fast'), "'--fast'", 'usage: scripts/setup')
 
-    def test_no_network(self):
-        ran = self.setup_script(APT='offline')
-        self.expect_one_line(ran, 'no network', 'packages.example', 'nothing was installed')
-        self.assertEqual(self.installing_calls(), [])
+    def test_what_keeps_apt_from_it_is_told_and_nothing_is_installed(self):
+        for settings, told in [
+                ({'APT': 'offline'}, ('no network', 'packages.example', 'nothing was installed')),
+                ({'APT': 'locked'}, ('another program is installing packages',)),
+                ({'APT': 'small'}, ('the disk is full', '/var/cache/apt/archives', 'make room')),
+                ({'UNPACKED': '98,765 GB'}, ('the disk is full', '98765', '/usr', 'make room'))]:
+            with self.subTest(settings):
+                self.expect_one_line(self.setup_script(**settings), *told)
+                self.assertEqual(self.installing_calls(), [])
         self.assertEqual(self.setup_script().returncode, 0)
 
     def test_no_network_and_no_package_lists(self):
@@ -142,20 +147,6 @@ class SetupTest(Machine):
         ran = self.setup_script(APT='offline', LACKING='catkin')
         self.expect_one_line(ran, 'no network')
         self.assertNotIn('Debian', ran.stderr)
-
-    def test_another_apt_runs(self):
-        self.expect_one_line(self.setup_script(APT='locked'), 'another program is installing packages')
-        self.assertEqual(self.installing_calls(), [])
-
-    def test_disk_too_small_for_the_download(self):
-        ran = self.setup_script(APT='small')
-        self.expect_one_line(ran, 'the disk is full', '/var/cache/apt/archives', 'make room')
-        self.assertEqual(self.installing_calls(), [])
-
-    def test_disk_too_small_for_what_is_downloaded(self):
-        ran = self.setup_script(UNPACKED='98,765 GB')
-        self.expect_one_line(ran, 'the disk is full', '98765', '/usr', 'make room')
-        self.assertEqual(self.installing_calls(), [])
 
     def test_disk_full_in_the_middle_and_again(self):
         self.expect_one_line(self.setup_script(APT='full'), 'interrupted', 'the disk is full', 'the next run goes on')

@@ -10,6 +10,7 @@
 #include "oracle/promises.h"
 #include "support/flush_to_zero.h"
 #include "support/generators.h"
+#include "support/pair_list.h"
 #include "support/query_property.h"
 #include "support/query_symmetries.h"
 #include "support/simd_targets.h"
@@ -127,43 +128,6 @@ TEST(ElementaryExact, CellsOfAllWidthsContainEachOther) {
   });
 }
 
-/// A chunk of pairs of one kind, as a batch wants them.
-struct Chunk {
-  std::vector<Query> queries;
-  std::vector<VertexMotion> vertices;
-  std::vector<Quad> quads;
-
-  void add(const Query& query) {
-    Quad quad;
-    for (int i = 0; i < 4; ++i) {
-      VertexMotion vertex{};
-      std::copy_n(query.motion.x[0][i], 3, vertex.t0);
-      std::copy_n(query.motion.x[1][i], 3, vertex.t1);
-      quad[i] = static_cast<Index>(vertices.size());
-      vertices.push_back(vertex);
-    }
-    quads.push_back(quad);
-    queries.push_back(query);
-  }
-
-  std::vector<ElementaryResult> run(const Rung& rung, TierCounters& counters) const {
-    PairBatch batch;
-    batch.kind = queries.front().kind;
-    batch.vertices = vertices.data();
-    batch.pairs = quads.data();
-    batch.count = quads.size();
-    std::vector<ElementaryResult> results(quads.size());
-    rung.run(batch, results.data(), counters);
-    return results;
-  }
-};
-
-Chunk hardChunk(RandomSource& random, PairKind kind, std::size_t count) {
-  Chunk chunk;
-  while (chunk.queries.size() < count) chunk.add(hardQuery(random, kind));
-  return chunk;
-}
-
 // Lanes must not disturb each other, whatever stands beside a pair and wherever in the batch it stands.
 TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
   const auto test = makeRung(exactOptions(32));
@@ -171,17 +135,23 @@ TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
   const int rounds = longRun() ? 2000 : 60;
   for (int round = 0; round < rounds; ++round) {
     const std::size_t count = 1 + random() % 600;
-    const Chunk chunk = hardChunk(random, round % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE, count);
+    PairList pairs(round % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE);
+    std::vector<Query> queries;
+    while (queries.size() < count) {
+      queries.push_back(hardQuery(random, pairs.kind));
+      pairs.add(queries.back().motion);
+    }
     TierCounters counters;
-    const std::vector<ElementaryResult> results = chunk.run(*test, counters);
+    std::vector<ElementaryResult> results(count);
+    test->run(batchOf(pairs), results.data(), counters);
     std::uint64_t settled = 0;
     for (std::uint64_t tier : counters.settled) settled += tier;
     EXPECT_EQ(settled, count) << "every pair is settled by one tier";
     for (std::size_t i = 0; i < count; ++i) {
-      const ElementaryResult single = testQuery(*test, chunk.queries[i]);
+      const ElementaryResult single = testQuery(*test, queries[i]);
       ASSERT_TRUE(sameAnswer(results[i], single) && results[i].tier == single.tier)
           << "pair " << i << " of " << count << ": " << described(results[i]) << ", alone " << described(single)
-          << "\nreplay: run_queries " << writeReplayFile("exact-batch", chunk.queries[i]);
+          << "\nreplay: run_queries " << writeReplayFile("exact-batch", queries[i]);
     }
   }
 }

@@ -23,12 +23,6 @@ constexpr std::size_t MONITORS = 4;  // in effects.test; each listens to /tf
 
 using ContactMessage = deformable_ccd::ContactArray::_contacts_type::value_type;
 
-double earliest(const deformable_ccd::ContactArray& outcome) {
-  double toc = 2;
-  for (const ContactMessage& contact : outcome.contacts) toc = std::min(toc, contact.toc_lower);
-  return toc;
-}
-
 // --- a grid above a block of voxels ----------------------------------------------------------------------------------
 
 struct Filtered : MonitorTest {

@@ -176,16 +176,7 @@ StructuredPairs pairsOf(const std::string& family, PairKind kind, const std::vec
   StructuredPairs set;
   set.family = family;
   set.kind = kind;
-  for (const Query& query : queries) {
-    const Index base = static_cast<Index>(set.vertices.size());
-    for (int p = 0; p < 4; ++p) {
-      VertexMotion v{};
-      std::copy_n(query.motion.x[0][p], 3, v.t0);
-      std::copy_n(query.motion.x[1][p], 3, v.t1);
-      set.vertices.push_back(v);
-    }
-    set.pairs.push_back({base, base + 1, base + 2, base + 3});
-  }
+  for (const Query& query : queries) set.add(query.motion);
   return set;
 }
 
@@ -194,25 +185,6 @@ StructuredPairs hardPairs(Hardness hardness, PairKind kind, std::size_t count) {
   std::vector<Query> queries;
   for (std::size_t i = 0; i < count; ++i) queries.push_back(hardQuery(random, kind, hardness));
   return pairsOf(toString(hardness), kind, queries);
-}
-
-PairBatch batchOf(const StructuredPairs& pairs) {
-  PairBatch batch;
-  batch.kind = pairs.kind;
-  batch.vertices = pairs.vertices.data();
-  batch.pairs = pairs.pairs.data();
-  batch.count = pairs.pairs.size();
-  return batch;
-}
-
-PairMotion motionOf(const StructuredPairs& pairs, std::size_t i) {
-  PairMotion motion;
-  for (int p = 0; p < 4; ++p) {
-    const VertexMotion& v = pairs.vertices[pairs.pairs[i][p]];
-    std::copy(v.t0, v.t0 + 3, motion.x[0][p]);
-    std::copy(v.t1, v.t1 + 3, motion.x[1][p]);
-  }
-  return motion;
 }
 
 }  // namespace test

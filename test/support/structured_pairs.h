@@ -6,18 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "dccd/elementary.h"
 #include "support/generators.h"
+#include "support/pair_list.h"
 
 namespace dccd {
 namespace test {
 
 /// Two surfaces' pairs of one kind whose boxes meet.
-struct StructuredPairs {
+struct StructuredPairs : PairList {
   std::string family;
-  PairKind kind = PairKind::VERTEX_FACE;
-  std::vector<VertexMotion> vertices;
-  std::vector<Quad> pairs;
 };
 
 /// All families, vertex-face and edge-edge of each. Two sheets of cells x cells quads each.
@@ -33,11 +30,6 @@ StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed);
 StructuredPairs pairsOf(const std::string& family, PairKind kind, const std::vector<Query>& queries);
 /// Random pairs of a family, the same in each run.
 StructuredPairs hardPairs(Hardness hardness, PairKind kind, std::size_t count);
-
-/// All of them. Shows the set's own memory.
-PairBatch batchOf(const StructuredPairs& pairs);
-/// One of its pairs.
-PairMotion motionOf(const StructuredPairs& pairs, std::size_t i);
 
 }  // namespace test
 }  // namespace dccd

@@ -16,6 +16,7 @@
 #include "simd/fused_filter.h"
 #include "simd/group_pairs.h"
 #include "support/data.h"
+#include "support/pair_list.h"
 #include "support/patch_oracle.h"
 #include "support/scene_data.h"
 #include "support/step_support.h"
@@ -255,35 +256,19 @@ TEST(StepTimes, ATimeOutsideOfItsCellIsSeen) {
 
 // --- the filters of the step on single pairs -------------------------------------------------------------------------
 
-struct TruePairs {
-  std::vector<VertexMotion> vertices;
-  std::vector<Quad> pairs;
-  void add(const PairMotion& motion) {
-    Quad quad;
-    for (int i = 0; i < 4; ++i) {
-      quad[i] = static_cast<Index>(vertices.size());
-      VertexMotion v{};
-      std::copy_n(motion.x[0][i], 3, v.t0);
-      std::copy_n(motion.x[1][i], 3, v.t1);
-      vertices.push_back(v);
-    }
-    pairs.push_back(quad);
-  }
-};
-
-void expectFusedKeepsAll(const TruePairs& truth, PairKind kind, const std::string& what) {
+void expectFusedKeepsAll(const PairList& truth, const std::string& what) {
   std::vector<std::uint32_t> kept(truth.pairs.size());
   for (const simd::FusedPlanes planes :
        {simd::FusedPlanes::COORDINATE, simd::FusedPlanes::ADAPTIVE, simd::FusedPlanes::ALL}) {
     EXPECT_EQ(simd::fusedFilter(truth.vertices[0].t0, truth.pairs[0].data(), truth.pairs.size(),
-                                kind == PairKind::EDGE_EDGE, planes, kept.data()),
+                                truth.kind == PairKind::EDGE_EDGE, planes, kept.data()),
               truth.pairs.size())
         << what;
   }
 }
 
 /// Each pair as two groups of one feature, with records over the range of `vertices`.
-void expectLinearKeepsAll(const TruePairs& truth, PairKind kind, const std::string& what) {
+void expectLinearKeepsAll(const PairList& truth, const std::string& what) {
   double low[8], high[8], scale[8];
   std::fill_n(low, 8, HUGE_VAL);
   std::fill_n(high, 8, -HUGE_VAL);
@@ -293,7 +278,7 @@ void expectLinearKeepsAll(const TruePairs& truth, PairKind kind, const std::stri
   simd::quantize(truth.vertices[0].t0, truth.vertices.size(), low, scale, records.data());
   auto soa = hwy::AllocateAligned<std::int16_t>(2 * simd::SOA_SIZE);
   auto aos = hwy::AllocateAligned<std::int16_t>(2 * simd::AOS_SIZE);
-  const std::size_t first = kind == PairKind::VERTEX_FACE ? 1 : 2;
+  const std::size_t first = truth.kind == PairKind::VERTEX_FACE ? 1 : 2;
   for (const Quad& quad : truth.pairs) {
     for (std::size_t side = 0; side < 2; ++side) {
       const std::size_t arity = side == 0 ? first : 4 - first;
@@ -311,9 +296,9 @@ void expectLinearKeepsAll(const TruePairs& truth, PairKind kind, const std::stri
   }
 }
 
-void expectBoundsHold(const TruePairs& truth, PairKind kind, const std::string& what) {
+void expectBoundsHold(const PairList& truth, const std::string& what) {
   for (const Quad& quad : truth.pairs) {
-    const double bound = linearTocBound(kind, truth.vertices.data(), quad, 0);
+    const double bound = linearTocBound(truth.kind, truth.vertices.data(), quad, 0);
     ASSERT_GE(bound, 0) << what;
     ASSERT_LE(bound, 1) << what << ": a true contact is said never to be";
   }
@@ -323,17 +308,17 @@ TEST(StepFilters, CullNoTrueContactOfTheQueries) {
   DEFORMABLE_CCD_REQUIRE_DATA();
   std::size_t count = 0;
   for (const QueryFileEntry& file : findQueryFiles(dataDir() + "/ccd_queries")) {
-    TruePairs truth;
+    PairList truth(file.kind);
     for (const Query& query : readQueryFile(file.path, file.kind)) {
       if (query.contact) truth.add(query.motion);
     }
     if (truth.pairs.empty()) continue;
     count += truth.pairs.size();
     forEachSimdTarget([&](const std::string& target) {
-      expectFusedKeepsAll(truth, file.kind, target + ", " + file.path);
-      expectLinearKeepsAll(truth, file.kind, target + ", " + file.path);
+      expectFusedKeepsAll(truth, target + ", " + file.path);
+      expectLinearKeepsAll(truth, target + ", " + file.path);
     });
-    expectBoundsHold(truth, file.kind, file.path);
+    expectBoundsHold(truth, file.path);
   }
   std::cout << count << " queries in contact\n";
   EXPECT_GT(count, 200u);
@@ -344,14 +329,14 @@ TEST(StepFilters, CullNoTrueContactOfTheScenes) {
   for (const char* name : {"cloth-ball", "n-body"}) {
     const SceneData scene = readScene(name);
     for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
-      TruePairs truth;
+      PairList truth(kind);
       truth.vertices = scene.vertices;
       for (const TruthPair& p : kind == PairKind::VERTEX_FACE ? scene.vertex_face : scene.edge_edge) {
         if (p.contact) truth.pairs.push_back(p.pair);
       }
-      forEachSimdTarget([&](const std::string& target) { expectFusedKeepsAll(truth, kind, target + ", " + name); });
-      expectLinearKeepsAll(truth, kind, name);
-      expectBoundsHold(truth, kind, name);
+      forEachSimdTarget([&](const std::string& target) { expectFusedKeepsAll(truth, target + ", " + name); });
+      expectLinearKeepsAll(truth, name);
+      expectBoundsHold(truth, name);
     }
   }
 }

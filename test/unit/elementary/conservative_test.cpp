@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -10,7 +9,9 @@
 #include "dccd/elementary.h"
 #include "elementary/conservative_advance.h"
 #include "oracle/exact_distance.h"
+#include "oracle/promises.h"
 #include "support/generators.h"
+#include "support/pair_list.h"
 
 namespace dccd {
 namespace test {
@@ -24,24 +25,8 @@ AccuracyOptions optionsOf(double tolerance_m, int max_subdivisions = 4096) {
   return options;
 }
 
-/// The pair through run(), with a minimum separation.
 ElementaryResult testApart(const AccuracyOptions& options, PairKind kind, const PairMotion& pair, double separation_m) {
-  VertexMotion vertices[4] = {};
-  for (int i = 0; i < 4; ++i) {
-    std::memcpy(vertices[i].t0, pair.x[0][i], sizeof pair.x[0][i]);
-    std::memcpy(vertices[i].t1, pair.x[1][i], sizeof pair.x[1][i]);
-  }
-  const Quad quad = {0, 1, 2, 3};
-  PairBatch batch;
-  batch.kind = kind;
-  batch.vertices = vertices;
-  batch.pairs = &quad;
-  batch.count = 1;
-  batch.minimum_separation_m = &separation_m;
-  ElementaryResult result;
-  TierCounters counters;
-  makeRung(options)->run(batch, &result, counters);
-  return result;
+  return testQuery(*makeRung(options), {kind, pair, false}, separation_m);
 }
 
 /// A vertex that moves from (x, y, z0) to (x, y, z1) over the unit triangle at rest.
@@ -104,35 +89,21 @@ TEST(Conservative, BeyondRoundingItIsUndecidedFromTheStart) {
 TEST(Conservative, ASeparationOfZeroIsNoSeparation) {
   RandomSource random(3);
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
-    std::vector<VertexMotion> vertices;
-    std::vector<Quad> quads;
+    PairList pairs(kind);
     std::vector<double> separations;
     for (int i = 0; i < 1500; ++i) {
-      const Query query = hardQuery(random, kind, i % 3 == 0 ? Hardness::GRAZING : Hardness::GENERAL);
-      Quad quad;
-      for (int k = 0; k < 4; ++k) {
-        VertexMotion vertex = {};
-        std::memcpy(vertex.t0, query.motion.x[0][k], sizeof query.motion.x[0][k]);
-        std::memcpy(vertex.t1, query.motion.x[1][k], sizeof query.motion.x[1][k]);
-        quad[k] = static_cast<Index>(vertices.size());
-        vertices.push_back(vertex);
-      }
-      quads.push_back(quad);
+      pairs.add(hardQuery(random, kind, i % 3 == 0 ? Hardness::GRAZING : Hardness::GENERAL).motion);
       separations.push_back(i % 2 == 0 ? 0 : 1e-3);
     }
     const auto test = makeRung(optionsOf(1e-6));
-    PairBatch batch;
-    batch.kind = kind;
-    batch.vertices = vertices.data();
-    batch.pairs = quads.data();
-    batch.count = quads.size();
-    std::vector<ElementaryResult> plain(quads.size()), mixed(quads.size());
+    PairBatch batch = batchOf(pairs);
+    std::vector<ElementaryResult> plain(pairs.size()), mixed(pairs.size());
     TierCounters plain_counters, mixed_counters;
     test->run(batch, plain.data(), plain_counters);
     batch.minimum_separation_m = separations.data();
     test->run(batch, mixed.data(), mixed_counters);
     std::size_t contacts = 0;
-    for (std::size_t i = 0; i < quads.size(); ++i) {
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
       contacts += plain[i].verdict == Verdict::CONTACT;
       if (separations[i] == 0) {
         ASSERT_EQ(plain[i].verdict, mixed[i].verdict) << i;
@@ -145,7 +116,7 @@ TEST(Conservative, ASeparationOfZeroIsNoSeparation) {
       }
     }
     EXPECT_GT(contacts, 300u);
-    EXPECT_GT(plain_counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)], quads.size() / 2);
+    EXPECT_GT(plain_counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)], pairs.size() / 2);
   }
 }
 
@@ -154,13 +125,10 @@ TEST(Conservative, ClosingSpeedBoundsEveryChangeOfDistance) {
   std::uniform_real_distribution<double> time(0, 1);
   for (int i = 0; i < 500; ++i) {
     const Query query = hardQuery(random, i % 2 ? PairKind::EDGE_EDGE : PairKind::VERTEX_FACE, Hardness::GENERAL);
-    VertexMotion vertices[4] = {};
-    for (int k = 0; k < 4; ++k) {
-      std::memcpy(vertices[k].t0, query.motion.x[0][k], sizeof query.motion.x[0][k]);
-      std::memcpy(vertices[k].t1, query.motion.x[1][k], sizeof query.motion.x[1][k]);
-    }
-    const double speed =
-        conservative::closingSpeed(query.kind, {&vertices[0], &vertices[1], &vertices[2], &vertices[3]});
+    PairList pair(query.kind);
+    pair.add(query.motion);
+    const std::vector<VertexMotion>& v = pair.vertices;
+    const double speed = conservative::closingSpeed(query.kind, {&v[0], &v[1], &v[2], &v[3]});
     const double a = time(random), b = time(random);
     const double change = std::fabs(approximateDistanceAt(query.kind, query.motion, a) -
                                     approximateDistanceAt(query.kind, query.motion, b));

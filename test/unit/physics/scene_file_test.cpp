@@ -28,6 +28,13 @@ std::string errorOf(std::string text, const std::string& from, const std::string
   return test::said<ParameterError>([&] { parseScene(text, "s.yaml"); }, "accepted");
 }
 
+/// What is said of the text `good` with one part of it replaced.
+void expectTold(const std::string& from, const std::string& to, const std::string& told,
+                const std::string& good = GOOD) {
+  const std::string error = errorOf(good, from, to);
+  EXPECT_NE(error.find(told), std::string::npos) << to << ": " << error;
+}
+
 TEST(SceneFile, ReadsWhatItSays) {
   const SceneSpec spec = parseScene(GOOD, "s.yaml");
   EXPECT_EQ(spec.name, "drop");
@@ -44,73 +51,52 @@ TEST(SceneFile, ReadsWhatItSays) {
   EXPECT_FALSE(spec.bodies[0].friction.has_value());
 }
 
-TEST(SceneFile, AnUnknownKeyIsNamedWithItsLineAndTheKnownOnes) {
-  const std::string error = errorOf(GOOD, "mass_kg", "mas_kg");
-  EXPECT_NE(error.find("s.yaml:"), std::string::npos) << error;
-  EXPECT_NE(error.find("mass_kg is needed: a number from"), std::string::npos) << error;
-  const std::string extra = errorOf(GOOD, "    mass_kg: 0.1\n", "    mass_kg: 0.1\n    colour: red\n");
-  EXPECT_NE(extra.find("s.yaml:9: bodies[0]/colour is not known; nearest is bodies[0]/"), std::string::npos) << extra;
-}
-
-TEST(SceneFile, ValuesOutOfRangeOrOfTheWrongTypeAreRefused) {
-  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: -1").find("s.yaml:8: bodies[0]/mass_kg is -1, it must be from"),
-            std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: .nan").find("mass_kg is nan, it must be from"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: heavy").find("is a string, a number is needed"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: 2.5").find("an integer is needed"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "rows: 3", "rows: 1").find("rows"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "[0, -9.81]").find("a list of 3 numbers"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "9.81").find("a list of 3 numbers"), std::string::npos);
-}
-
-TEST(SceneFile, ContradictionsAreRefused) {
-  EXPECT_NE(errorOf(GOOD, "sheet: {rows: 3", "grippers: [{vertices: [12]}]\n    sheet: {rows: 3").find("from 0 to 11"),
-            std::string::npos);
-  EXPECT_NE(
-      errorOf(GOOD, "sheet: {rows: 3", "grippers: [{row: 0, col: 0}]\n    sheet: {rows: 3").find("needs just one of"),
-      std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "    sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}",
-                    "    rope: {points: 9, length_m: 1, center_m: [0, 0, 1]}")
-                .find("a rope has no faces"),
-            std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "bodies:",
-                    "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 1], max_m: [1, 1, 1]}}]}\nbodies:")
-                .find("max_m must be above min_m"),
-            std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"),
-            std::string::npos);
-  EXPECT_NE(
-      errorOf(GOOD, "bodies:",
-              "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:")
-          .find("s.yaml:7: rigid_bodies[0]/self_collision has no meaning: the body is rigid and cannot meet itself; "
-                "remove this line"),
-      std::string::npos);
+TEST(SceneFile, WhatIsWrongIsNamedWithItsLineAndWhatToWrite) {
+  const std::string sheet = "sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}";
+  expectTold("mass_kg", "mas_kg", "s.yaml:");
+  expectTold("mass_kg", "mas_kg", "mass_kg is needed: a number from");
+  expectTold("    mass_kg: 0.1\n", "    mass_kg: 0.1\n    colour: red\n",
+             "s.yaml:9: bodies[0]/colour is not known; nearest is bodies[0]/");
+  expectTold("mass_kg: 0.1", "mass_kg: -1", "s.yaml:8: bodies[0]/mass_kg is -1, it must be from");
+  expectTold("mass_kg: 0.1", "mass_kg: .nan", "mass_kg is nan, it must be from");
+  expectTold("mass_kg: 0.1", "mass_kg: heavy", "is a string, a number is needed");
+  expectTold("frames: 5", "frames: 2.5", "an integer is needed");
+  expectTold("rows: 3", "rows: 1", "rows");
+  expectTold("[0, 0, -9.81]", "[0, -9.81]", "a list of 3 numbers");
+  expectTold("[0, 0, -9.81]", "9.81", "a list of 3 numbers");
+  expectTold(sheet, "grippers: [{vertices: [12]}]\n    " + sheet, "from 0 to 11");
+  expectTold(sheet, "grippers: [{row: 0, col: 0}]\n    " + sheet, "needs just one of");
+  expectTold(sheet, "rope: {points: 9, length_m: 1, center_m: [0, 0, 1]}", "a rope has no faces");
+  expectTold("bodies:", "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 1], max_m: [1, 1, 1]}}]}\nbodies:",
+             "max_m must be above min_m");
+  expectTold("bodies:", "obstacle: {resolution_m: 0.1}\nbodies:", "at least one solid");
+  expectTold(
+      "bodies:", "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:",
+      "s.yaml:7: rigid_bodies[0]/self_collision has no meaning: the body is rigid and cannot meet itself; remove "
+      "this line");
 }
 
 TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
-  const auto with = [](const std::string& monitor) {
-    return errorOf(GOOD, "bodies:", "monitor:\n" + monitor + "bodies:");
-  };
-  EXPECT_EQ(with("  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: 4}}\n"),
-            "accepted");
-  EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\n")
-                .find("s.yaml:8: monitor/bodies/cloth/topology/rows and cols are 4 x 4 = 16, but sheet has 12 points; "
-                      "write rows: "
-                      "3, cols: 4"),
-            std::string::npos);
+  expectTold("bodies:",
+             "monitor:\n  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: "
+             "4}}\nbodies:",
+             "accepted");
+  expectTold(
+      "bodies:", "monitor:\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\nbodies:",
+      "s.yaml:8: monitor/bodies/cloth/topology/rows and cols are 4 x 4 = 16, but sheet has 12 points; write rows: "
+      "3, cols: 4");
 }
 
 TEST(SceneFile, WhatItExpectsIsReadStrictly) {
   // Five frames at 30 Hz: the last one comes after 0.133 s.
-  const std::string scene = std::string(GOOD) +
-                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
-                            "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n";
+  const std::string text = std::string(GOOD) +
+                           "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
+                           "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n";
   const auto with = [&](const std::string& expect) {
-    return errorOf(scene, "bodies:", "expect:\n" + expect + "bodies:");
+    return errorOf(text, "bodies:", "expect:\n" + expect + "bodies:");
   };
   const auto expectTold = [&](const std::string& expect, const std::string& part) {
-    const std::string error = with(expect);
-    EXPECT_NE(error.find(part), std::string::npos) << expect << error;
+    scene::expectTold("bodies:", "expect:\n" + expect + "bodies:", part, text);
   };
   EXPECT_EQ(with("  octomap: {first_contact_s: [0.05, 0.1], contacts_at_least: 3}\n  self: none\n"
                  "  body: {names: [sheet, finger], first_contact_s: [0.05, 0.05]}\n"
@@ -148,22 +134,21 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
              "expect/clear/until_s contradicts first_contact_s: [0.05, 0.1]; write no later time than its first");
   expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {again_s: 0.09}\n",
              "expect/clear/again_s contradicts first_contact_s: [0.05, 0.1]; write no earlier time than its last");
-  EXPECT_NE(errorOf(GOOD, "bodies:", "expect: {octomap: {first_contact_s: [0, 0.1]}}\nbodies:")
-                .find("expect/octomap has no meaning without an obstacle; remove this line"),
-            std::string::npos);
+  scene::expectTold("bodies:", "expect: {octomap: {first_contact_s: [0, 0.1]}}\nbodies:",
+                    "expect/octomap has no meaning without an obstacle; remove this line");
   EXPECT_EQ(errorOf(GOOD, "bodies:", "expect: {octomap: none}\nbodies:"), "accepted");
 }
 
 TEST(SceneFile, ACameraIsReadStrictly) {
-  const std::string scene = std::string(GOOD) +
-                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
-                            "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 0.2]}}]}\n";
+  const std::string text = std::string(GOOD) +
+                           "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
+                           "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 0.2]}}]}\n";
   const std::string size = ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: 5";
   const auto with = [&](const std::string& camera) {
-    return errorOf(scene, "bodies:", "camera: {" + camera + "}\nbodies:");
+    return errorOf(text, "bodies:", "camera: {" + camera + "}\nbodies:");
   };
   const auto expectTold = [&](const std::string& camera, const std::string& part) {
-    EXPECT_NE(with(camera).find(part), std::string::npos) << camera << ": " << with(camera);
+    scene::expectTold("bodies:", "camera: {" + camera + "}\nbodies:", part, text);
   };
   const std::string at = "position_m: [0, 0, 2]", down = at + ", looks_at_m: [0, 0, 0]";
   EXPECT_EQ(with(down + size), "accepted");
@@ -196,9 +181,8 @@ TEST(SceneFile, ACameraIsReadStrictly) {
   expectTold(down + size + ", topic: /sheet", "camera/topic is another's, too");
   expectTold(down + size + ", truth_topic: /octomap_binary", "camera/truth_topic is another's, too");
   expectTold(down + size + ", frame: finger", "camera/frame is another's, too");
-  EXPECT_NE(errorOf(GOOD, "bodies:", "camera: {" + down + size + "}\nbodies:")
-                .find("s.yaml:6: camera needs an obstacle, whose topic and resolution its map has"),
-            std::string::npos);
+  scene::expectTold("bodies:", "camera: {" + down + size + "}\nbodies:",
+                    "s.yaml:6: camera needs an obstacle, whose topic and resolution its map has");
 }
 
 TEST(SceneFile, ACameraLooksUprightAtItsPlace) {
@@ -243,22 +227,17 @@ TEST(SceneFile, ARobotsJointsAndWhatItsLinksHoldAreRead) {
   const Gripper& gripper = spec.bodies[0].grippers.at(0);
   EXPECT_EQ(gripper.link, "hand");
   EXPECT_EQ(gripper.grasp_s, 0.05);
-  const auto expectTold = [&](const std::string& from, const std::string& to, const std::string& told) {
-    const std::string error = errorOf(good, from, to);
-    EXPECT_NE(error.find(told), std::string::npos) << error;
-  };
-  expectTold("time_s: 0.1, p", "time_s: 0, p", "joints/lift[1]/time_s must be later");
-  expectTold("  description: arm.urdf\n", "", "robot/description is needed");
-  expectTold("link: hand", "link: hand, motion: [{time_s: 0}]", "grippers[0]/motion contradicts link");
-  expectTold("[sheet, finger], first", "[sheet, sheet], first", "expect/body[0]/names has one name twice");
-  expectTold("first_contact_s: none", "first_contact_s: none, lasts: true", "expect/body[1]/lasts is not known");
-  const std::string alone = good.substr(0, good.find("robot:"));
-  const std::string error = errorOf(alone, "frames: 5", "frames: 6");
-  EXPECT_NE(error.find("grippers[0]/link has no meaning without a robot"), std::string::npos) << error;
+  expectTold("time_s: 0.1, p", "time_s: 0, p", "joints/lift[1]/time_s must be later", good);
+  expectTold("  description: arm.urdf\n", "", "robot/description is needed", good);
+  expectTold("link: hand", "link: hand, motion: [{time_s: 0}]", "grippers[0]/motion contradicts link", good);
+  expectTold("[sheet, finger], first", "[sheet, sheet], first", "expect/body[0]/names has one name twice", good);
+  expectTold("first_contact_s: none", "first_contact_s: none, lasts: true", "expect/body[1]/lasts is not known", good);
+  expectTold("frames: 5", "frames: 6", "grippers[0]/link has no meaning without a robot",
+             good.substr(0, good.find("robot:")));
 }
 
 TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
-  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
+  expectTold("frames: 5", "frames: [5", "not YAML");
   EXPECT_THROW(readSceneFile("no/such/scene.yaml"), ParameterError);
   EXPECT_THROW(parseScene("", "s.yaml"), ParameterError);
   EXPECT_THROW(parseScene("- a\n- b\n", "s.yaml"), ParameterError);

@@ -1,43 +1,21 @@
 // The parameters expected_contacts and phase: how they are read, and mistakes in them.
 #include <gtest/gtest.h>
 
-#include <functional>
-
 #include "unit/ros/parameter_support.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
-XmlRpcValue expectation(const char* one, const char* other) {
-  XmlRpcValue entry;
-  entry["between"][0] = one;
-  entry["between"][1] = other;
-  return entry;
-}
-
-XmlRpcValue clothAndFinger() {
-  XmlRpcValue tree;
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  tree["bodies"]["finger"]["topic"] = "finger";
-  return tree;
-}
+const char CLOTH_AND_FINGER[] = "bodies: {cloth: {topic: cloth}, finger: {topic: finger}}, expected_contacts: ";
 
 TEST(ExpectedContacts, AreReadWithTheirSetsAndPhases) {
-  XmlRpcValue tree = clothAndFinger();
-  tree["bodies"]["cloth"]["topology"]["sets"]["hem"][0] = 3;
-  tree["bodies"]["cloth"]["topology"]["sets"]["hem"][1] = 4;
-  tree["expected_contacts"][0] = expectation("octomap", "cloth");
-  tree["expected_contacts"][1] = expectation("cloth", "finger");
-  tree["expected_contacts"][1]["vertices"]["finger"][0] = 7;
-  tree["expected_contacts"][1]["vertices"]["cloth"] = "hem";
-  tree["expected_contacts"][1]["phase"] = "carry";
-  tree["expected_contacts"][2] = expectation("cloth", "self");
-  tree["expected_contacts"][2]["vertices"]["cloth"] = "hem";
-  tree["expected_contacts"][2]["phase"] = "fold";
-  tree["expected_contacts"][3] = tree["expected_contacts"][2];
-  tree["expected_contacts"][3]["vertices"]["self"][0] = 1;
-  tree["phase"] = "carry";
+  XmlRpcValue tree = parameters(
+      std::string(CLOTH_AND_FINGER) +
+      "[{between: [octomap, cloth]}, {between: [cloth, finger], vertices: {finger: [7], cloth: hem}, phase: carry}, "
+      "{between: [cloth, self], vertices: {cloth: hem}, phase: fold}, "
+      "{between: [cloth, self], vertices: {cloth: hem, self: [1]}, phase: fold}], phase: carry");
+  tree["bodies"]["cloth"]["topology"] = parameters("sets: {hem: [3, 4]}");
   const MonitorConfig config = readConfig(tree);
   ASSERT_EQ(config.expected_contacts.size(), 4u);
   EXPECT_EQ(config.bodies[0].sets.at("hem"), (std::vector<Index>{3, 4}));
@@ -61,12 +39,9 @@ TEST(ExpectedContacts, AreReadWithTheirSetsAndPhases) {
 }
 
 TEST(ExpectedContacts, OfABodyThatIsTakenAwayAreTakenAway) {
-  XmlRpcValue tree;
-  tree["bodies"]["arm"]["rigid"]["mesh"] = "arm.stl";
-  tree["bodies"]["arm"]["rigid"]["frame"] = "arm";
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  tree["expected_contacts"][0] = expectation("cloth", "arm");
-  tree["expected_contacts"][1] = expectation("cloth", "octomap");
+  XmlRpcValue tree = parameters(
+      "bodies: {arm: {rigid: {mesh: arm.stl, frame: arm}}, cloth: {topic: cloth}}, "
+      "expected_contacts: [{between: [cloth, arm]}, {between: [cloth, octomap]}]");
   ASSERT_EQ(readConfig(tree).expected_contacts.size(), 2u);
   tree["effects"]["rigid_bodies"] = "off";
   const MonitorConfig config = readConfig(tree);
@@ -75,36 +50,21 @@ TEST(ExpectedContacts, OfABodyThatIsTakenAwayAreTakenAway) {
 }
 
 TEST(ExpectedContacts, MistakesAreNamed) {
-  struct Case {
-    const char* expected;
-    std::function<void(XmlRpcValue&)> set;
+  const std::pair<const char*, const char*> cases[] = {
+      {"[{between: [clot, finger]}]",
+       "expected_contacts[0]/between names 'clot', which is no body and not octomap; nearest is 'cloth'"},
+      {"[{between: [self, octomap]}]", "expected_contacts[0]/between names self without a body"},
+      {"[{between: [cloth, finger], vertices: {sleeve: hem}}]", "expected_contacts[0]/vertices/sleeve"},
+      {"[{between: [cloth, finger], vertices: {self: hem}}]", "expected_contacts[0]/vertices/self"},
+      {"[{between: [cloth, finger], vertices: {cloth: [-1]}}]", "expected_contacts[0]/vertices/cloth"},
+      {"[{between: [cloth, finger], fase: carry}]", "expected_contacts[0]/fase"},
+      {"[{between: [cloth, finger], phase: carry}], phase: cary",
+       "~phase is 'cary', which expected_contacts does not name; known phases are 'carry', and '' for none"},
   };
-  const Case cases[] = {
-      {"expected_contacts[0]/between names 'clot', which is no body and not octomap; nearest is 'cloth'",
-       [](XmlRpcValue& t) { t["expected_contacts"][0] = expectation("clot", "finger"); }},
-      {"expected_contacts[0]/between names self without a body",
-       [](XmlRpcValue& t) { t["expected_contacts"][0] = expectation("self", "octomap"); }},
-      {"expected_contacts[0]/vertices/sleeve",
-       [](XmlRpcValue& t) { t["expected_contacts"][0]["vertices"]["sleeve"] = "hem"; }},
-      {"expected_contacts[0]/vertices/self",
-       [](XmlRpcValue& t) { t["expected_contacts"][0]["vertices"]["self"] = "hem"; }},
-      {"expected_contacts[0]/vertices/cloth",
-       [](XmlRpcValue& t) { t["expected_contacts"][0]["vertices"]["cloth"][0] = -1; }},
-      {"expected_contacts[0]/fase", [](XmlRpcValue& t) { t["expected_contacts"][0]["fase"] = "carry"; }},
-      {"~phase is 'cary', which expected_contacts does not name; known phases are 'carry', and '' for none",
-       [](XmlRpcValue& t) {
-         t["expected_contacts"][0]["phase"] = "carry";
-         t["phase"] = "cary";
-       }},
-      {"~bodies/cloth/topology/sets/hem",
-       [](XmlRpcValue& t) { t["bodies"]["cloth"]["topology"]["sets"]["hem"] = "1"; }},
-  };
-  for (const Case& one : cases) {
-    XmlRpcValue tree = clothAndFinger();
-    tree["expected_contacts"][0] = expectation("cloth", "finger");
-    one.set(tree);
-    EXPECT_TRUE(mentions(errorOf(tree), one.expected)) << errorOf(tree);
-  }
+  for (const auto& [contacts, said] : cases)
+    expectMistakes({{(CLOTH_AND_FINGER + std::string(contacts)).c_str(), said}});
+  expectMistakes(
+      {{"bodies: {cloth: {topic: cloth, topology: {sets: {hem: \"1\"}}}}", "~bodies/cloth/topology/sets/hem"}});
 }
 
 }  // namespace

@@ -1,7 +1,11 @@
-// What the tests of the node's parameters share: sections of parameters, and the error that a tree of them leads to.
+// What the tests of the node's parameters share: parameters out of YAML, and the error that they lead to.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "config/monitor_config.h"
 #include "support/said.h"
@@ -15,18 +19,35 @@ inline std::string errorOf(XmlRpcValue tree) {
   return said<ParameterError>([&] { readConfig(tree); });
 }
 
-inline XmlRpcValue separationPair(const std::string& a, const std::string& b, double separation_m) {
-  XmlRpcValue pair;
-  pair["between"][0] = a;
-  pair["between"][1] = b;
-  pair["separation_m"] = separation_m;
-  return pair;
+/// What rosparam makes of the values of a YAML file.
+inline XmlRpcValue onServer(const ParameterTree& tree) {
+  XmlRpcValue value;
+  switch (tree.kind) {
+    case ParameterTree::Kind::BOOLEAN:
+      return XmlRpcValue(tree.truth);
+    case ParameterTree::Kind::INTEGER:
+      return XmlRpcValue(tree.integer);
+    case ParameterTree::Kind::NUMBER:
+      return XmlRpcValue(tree.number);
+    case ParameterTree::Kind::TEXT:
+      return XmlRpcValue(tree.text);
+    default:
+      break;
+  }
+  for (std::size_t i = 0; i < tree.items.size(); ++i) value[static_cast<int>(i)] = onServer(tree.items[i]);
+  for (const auto& [name, member] : tree.members) value[name] = onServer(member);
+  return value;
 }
 
-/// A body `seen` that is a depth camera's cloud, and nothing else.
-inline void depthImage(XmlRpcValue& tree) {
-  tree["bodies"]["seen"]["motion"] = "static";
-  tree["bodies"]["seen"]["topology"]["source"] = "depth_image";
+/// The parameters in the braces of a YAML map.
+inline XmlRpcValue parameters(const std::string& yaml) { return onServer(parseYaml("{" + yaml + "}", "p.yaml")); }
+
+/// Of each case: what is said of the parameters.
+inline void expectMistakes(const std::vector<std::pair<const char*, const char*>>& cases) {
+  for (const auto& [yaml, said] : cases) {
+    const std::string error = errorOf(parameters(yaml));
+    EXPECT_TRUE(mentions(error, said)) << yaml << ": " << error;
+  }
 }
 
 }  // namespace test

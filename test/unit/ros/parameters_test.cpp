@@ -3,7 +3,6 @@
 
 #include <cstdio>
 #include <fstream>
-#include <functional>
 
 #include "unit/ros/parameter_support.h"
 
@@ -24,46 +23,30 @@ TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
   EXPECT_EQ(none.octomap_topic, "octomap_binary");
   EXPECT_FALSE(none.namesOctomap());
   EXPECT_FALSE(none.bodies[0].topic_named);
-  const auto with = [](const std::function<void(XmlRpcValue&)>& set) {
-    XmlRpcValue tree;
-    set(tree);
-    return readConfig(tree);
-  };
-  EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_topic"] = "octomap_binary"; }).namesOctomap()) << "also the default";
-  EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_file"] = "/map.bt"; }).namesOctomap());
-  EXPECT_TRUE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "on"; }).namesOctomap());
-  EXPECT_FALSE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "auto"; }).namesOctomap());
-  EXPECT_TRUE(with([](XmlRpcValue& t) { t["obstacle_cloud_topic"] = "/points"; }).takesClouds());
-  EXPECT_TRUE(with([](XmlRpcValue& t) { t["obstacle_resolution_m"] = 0.02; }).namesOctomap());
-  EXPECT_FALSE(with([](XmlRpcValue&) {}).takesClouds()) << "a default names nothing";
-  EXPECT_FALSE(with([](XmlRpcValue& t) {
-                 t["octomap_topic"] = "/map";
-                 t["effects"]["octomap"] = "off";
-               }).namesOctomap());
-  EXPECT_TRUE(with([](XmlRpcValue& t) { t["topic"] = "mesh"; }).bodies[0].topic_named);
-  EXPECT_FALSE(with([](XmlRpcValue& t) { t["default_topic"] = "/cloth"; }).bodies[0].topic_named);
-  XmlRpcValue empty;
-  empty["octomap_topic"] = "";
-  EXPECT_TRUE(mentions(errorOf(empty), "octomap_topic is empty; remove it")) << errorOf(empty);
+  const auto with = [](const std::string& yaml) { return readConfig(parameters(yaml)); };
+  EXPECT_TRUE(with("octomap_topic: octomap_binary").namesOctomap()) << "also the default";
+  EXPECT_TRUE(with("octomap_file: /map.bt").namesOctomap());
+  EXPECT_TRUE(with("effects: {octomap: \"on\"}").namesOctomap());
+  EXPECT_FALSE(with("effects: {octomap: auto}").namesOctomap());
+  EXPECT_TRUE(with("obstacle_cloud_topic: /points").takesClouds());
+  EXPECT_TRUE(with("obstacle_resolution_m: 0.02").namesOctomap());
+  EXPECT_FALSE(none.takesClouds()) << "a default names nothing";
+  EXPECT_FALSE(with("octomap_topic: /map, effects: {octomap: \"off\"}").namesOctomap());
+  EXPECT_TRUE(with("topic: mesh").bodies[0].topic_named);
+  EXPECT_FALSE(with("default_topic: /cloth").bodies[0].topic_named);
+  expectMistakes({{"octomap_topic: \"\"", "octomap_topic is empty; remove it"}});
 }
 
 TEST(Parameters, ADefaultTopicIsThatOfASingleBodyWithoutOne) {
-  XmlRpcValue tree;
-  tree["default_topic"] = "/cloth";
-  EXPECT_EQ(readConfig(tree).bodies[0].topic, "/cloth");
-  tree["topic"] = "mesh";
-  EXPECT_EQ(readConfig(tree).bodies[0].topic, "mesh");
-  XmlRpcValue listed;
-  listed["default_topic"] = "/cloth";
-  listed["bodies"]["mesh"]["motion"] = "stream";
-  EXPECT_EQ(readConfig(listed).bodies[0].topic, "mesh");
+  const auto topic = [](const char* yaml) { return readConfig(parameters(yaml)).bodies[0].topic; };
+  EXPECT_EQ(topic("default_topic: /cloth"), "/cloth");
+  EXPECT_EQ(topic("default_topic: /cloth, topic: mesh"), "mesh");
+  EXPECT_EQ(topic("default_topic: /cloth, bodies: {mesh: {motion: stream}}"), "mesh");
 }
 
 TEST(Parameters, ADepthImageIsHeldAgainstOtherBodiesOnly) {
-  XmlRpcValue tree;
-  depthImage(tree);
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  const MonitorConfig config = readConfig(tree);
+  const MonitorConfig config = readConfig(
+      parameters("bodies: {cloth: {topic: cloth}, seen: {motion: static, topology: {source: depth_image}}}"));
   const BodyConfig &cloth = config.bodies.at(0), &seen = config.bodies.at(1);
   EXPECT_TRUE(seen.isDepthImage());
   EXPECT_FALSE(seen.body.self_collision);
@@ -73,13 +56,10 @@ TEST(Parameters, ADepthImageIsHeldAgainstOtherBodiesOnly) {
 }
 
 TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
-  XmlRpcValue tree;
-  tree["bodies"]["felt"]["topic"] = "felt";
-  tree["bodies"]["felt"]["minimum_separation_m"] = 0.01;
-  tree["bodies"]["other"]["uncertainty"]["field"] = "sigma";
-  tree["bodies"]["other"]["uncertainty"]["scale"] = 3.0;
-  tree["minimum_separation_pairs"][0] = separationPair("octomap", "felt", 0.0);
-  tree["minimum_separation_pairs"][1] = separationPair("felt", "other", 0.02);
+  XmlRpcValue tree = parameters(
+      "bodies: {felt: {topic: felt, minimum_separation_m: 0.01}, other: {uncertainty: {field: sigma, scale: 3.0}}}, "
+      "minimum_separation_pairs: [{between: [octomap, felt], separation_m: 0.0}, "
+      "{between: [felt, other], separation_m: 0.02}]");
   const MonitorConfig config = readConfig(tree);
   EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::CONSERVATIVE);
   EXPECT_TRUE(config.holdsDistance());
@@ -100,14 +80,10 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
 }
 
 TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
-  XmlRpcValue tree;
-  tree["bodies"]["a_finger"]["rigid"]["mesh"] = "no_such_file.stl";
-  tree["bodies"]["a_finger"]["rigid"]["frame"] = "finger";
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  tree["minimum_separation_pairs"][0] = separationPair("cloth", "a_finger", 0.01);
-  tree["minimum_separation_pairs"][1] = separationPair("cloth", "cloth", 0.02);
-  tree["effects"]["rigid_bodies"] = "off";
-  const MonitorConfig config = readConfig(tree);
+  const MonitorConfig config = readConfig(
+      parameters("bodies: {a_finger: {rigid: {mesh: no_such_file.stl, frame: finger}}, cloth: {topic: cloth}}, "
+                 "minimum_separation_pairs: [{between: [cloth, a_finger], separation_m: 0.01}, "
+                 "{between: [cloth, cloth], separation_m: 0.02}], effects: {rigid_bodies: \"off\"}"));
   EXPECT_EQ(config.monitor.detector.excluded.size(), 1u) << "who reads ~state is told what is not there";
   EXPECT_NE(config.monitor.detector.excluded.at(0).find("by effects/rigid_bodies: off"), std::string::npos);
   ASSERT_EQ(config.bodies.size(), 1u);
@@ -123,11 +99,7 @@ TEST(Parameters, DistancesHaveLimitsThatMarkersShowThemBy) {
   EXPECT_EQ(defaults.monitor.detector.clearance.max_m, 0.5);
   EXPECT_EQ(defaults.monitor.detector.clearance.self_m, 0);
   EXPECT_EQ(defaults.markers.clearance_max_m, 0.5);
-  XmlRpcValue tree;
-  tree["clearance"]["tolerance_m"] = 1e-3;
-  tree["clearance"]["max_m"] = 2;
-  tree["clearance"]["self_m"] = 0.25;
-  const MonitorConfig given = readConfig(tree);
+  const MonitorConfig given = readConfig(parameters("clearance: {tolerance_m: 0.001, max_m: 2, self_m: 0.25}"));
   EXPECT_EQ(given.monitor.detector.clearance.tolerance_m, 1e-3);
   EXPECT_EQ(given.monitor.detector.clearance.max_m, 2);
   EXPECT_EQ(given.monitor.detector.clearance.self_m, 0.25);

@@ -12,19 +12,13 @@
 #include "simd/targets.h"
 #include "support/data.h"
 #include "support/generators.h"
+#include "support/pair_list.h"
 #include "support/scene_data.h"
 #include "support/simd_targets.h"
 
 namespace dccd {
 namespace test {
 namespace {
-
-/// Pairs of one kind, and what a kernel said of them.
-struct Batch {
-  PairKind kind = PairKind::VERTEX_FACE;
-  std::vector<VertexMotion> vertices;
-  std::vector<Quad> quads;
-};
 
 struct Answers {
   std::vector<std::uint8_t> verdict;
@@ -36,13 +30,13 @@ struct Answers {
 using Kernel = void (*)(const simd::BatchInput&, const simd::BatchOutput&);
 
 /// Runs a kernel on calls of `portion` pairs.
-Answers answersOf(Kernel kernel, const Batch& batch, int toc_bits, std::size_t portion) {
-  Answers answers(batch.quads.size());
-  for (std::size_t begin = 0; begin < batch.quads.size(); begin += portion) {
+Answers answersOf(Kernel kernel, const PairList& batch, int toc_bits, std::size_t portion) {
+  Answers answers(batch.pairs.size());
+  for (std::size_t begin = 0; begin < batch.pairs.size(); begin += portion) {
     simd::BatchInput input;
     input.vertices = batch.vertices[0].t0;
-    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.quads.data() + begin);
-    input.count = std::min(portion, batch.quads.size() - begin);
+    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs.data() + begin);
+    input.count = std::min(portion, batch.pairs.size() - begin);
     input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
     input.toc_bits = toc_bits;
     kernel(input, {&answers.verdict[begin], &answers.cell[begin], &answers.lo[begin], &answers.hi[begin]});
@@ -63,27 +57,14 @@ void expectSame(const Answers& expected, const Answers& actual, const std::strin
   }
 }
 
-void append(Batch& batch, const Query& query) {
-  Quad quad;
-  for (int i = 0; i < 4; ++i) {
-    VertexMotion vertex = {};
-    std::memcpy(vertex.t0, query.motion.x[0][i], sizeof query.motion.x[0][i]);
-    std::memcpy(vertex.t1, query.motion.x[1][i], sizeof query.motion.x[1][i]);
-    quad[i] = static_cast<Index>(batch.vertices.size());
-    batch.vertices.push_back(vertex);
-  }
-  batch.quads.push_back(quad);
-}
-
 /// Pairs of every hardness and general ones in turn, so that every path of the kernels has neighbours of other paths.
-Batch mixedBatch(PairKind kind, std::size_t count) {
+PairList mixedBatch(PairKind kind, std::size_t count) {
   RandomSource random(20170601);
-  Batch batch;
-  batch.kind = kind;
+  PairList batch(kind);
   constexpr int KINDS = static_cast<int>(Hardness::COUNT);
   for (std::size_t i = 0; i < count; ++i) {
     const Hardness hardness = i % 2 == 0 ? Hardness::GENERAL : static_cast<Hardness>(i / 2 % KINDS);
-    append(batch, hardQuery(random, kind, hardness));
+    batch.add(hardQuery(random, kind, hardness).motion);
   }
   return batch;
 }
@@ -93,7 +74,7 @@ constexpr PairKind KINDS[] = {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE};
 TEST(ExactBatch, EveryTargetComputesTheSameBits) {
   int targets = 0;
   for (const PairKind kind : KINDS) {
-    const Batch batch = mixedBatch(kind, 6000);
+    const PairList batch = mixedBatch(kind, 6000);
     for (const int bits : {10, 32, 52}) {
       const Answers exact = answersOf(simd::exactBatch, batch, bits, 2000);
       ASSERT_GT(std::count(exact.verdict.begin(), exact.verdict.end(), bits == 52 ? 3 : 1), 100);
@@ -111,7 +92,7 @@ TEST(ExactBatch, EveryTargetComputesTheSameBits) {
 // end of the outputs is written.
 TEST(ExactBatch, AnswersDoNotDependOnThePortions) {
   for (const PairKind kind : KINDS) {
-    const Batch batch = mixedBatch(kind, 700);
+    const PairList batch = mixedBatch(kind, 700);
     const Answers whole = answersOf(simd::exactBatch, batch, 32, 700);
     forEachTarget([&](const std::string& target) {
       for (const std::size_t portion : {1, 2, 3, 5, 7, 8, 9, 63, 64, 65, 127, 129, 333}) {
@@ -121,7 +102,7 @@ TEST(ExactBatch, AnswersDoNotDependOnThePortions) {
     });
     simd::BatchInput input;
     input.vertices = batch.vertices[0].t0;
-    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.quads.data());
+    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs.data());
     input.count = 61;
     input.kind = kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
     Answers guarded(128);
@@ -141,10 +122,9 @@ void checkScene(const std::string& name, std::size_t most_undecided) {
   std::size_t undecided = 0, without_cell = 0, pairs = 0;
   for (const PairKind kind : KINDS) {
     const std::vector<TruthPair>& truth = kind == PairKind::VERTEX_FACE ? scene.vertex_face : scene.edge_edge;
-    Batch batch;
-    batch.kind = kind;
+    PairList batch(kind);
     batch.vertices = scene.vertices;
-    for (const TruthPair& pair : truth) batch.quads.push_back(pair.pair);
+    for (const TruthPair& pair : truth) batch.pairs.push_back(pair.pair);
     const Answers answers = answersOf(simd::exactBatch, batch, 32, 2000);
     for (std::size_t i = 0; i < truth.size(); ++i) {
       ++pairs;

@@ -11,6 +11,7 @@
 
 #include "oracle/oracle.h"
 #include "support/generators.h"
+#include "support/pair_list.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -20,37 +21,12 @@ namespace {
 using simd::FusedPlanes;
 constexpr long double UNIT = 1.0L / 16777216.0L;
 
-struct PairList {
-  PairKind kind;
-  std::vector<VertexMotion> vertices;
-  std::vector<std::uint32_t> quads;
-
-  explicit PairList(PairKind k) : kind(k) {}
-  std::size_t size() const { return quads.size() / 4; }
-  void add(const PairMotion& pair) {
-    for (int i = 0; i < 4; ++i) {
-      VertexMotion v{};
-      std::copy_n(pair.x[0][i], 3, v.t0);
-      std::copy_n(pair.x[1][i], 3, v.t1);
-      quads.push_back(static_cast<std::uint32_t>(vertices.size()));
-      vertices.push_back(v);
-    }
-  }
-  PairMotion motion(std::size_t pair) const {
-    PairMotion m;
-    for (int i = 0; i < 4; ++i) {
-      std::copy_n(vertices[quads[4 * pair + static_cast<std::size_t>(i)]].t0, 3, m.x[0][i]);
-      std::copy_n(vertices[quads[4 * pair + static_cast<std::size_t>(i)]].t1, 3, m.x[1][i]);
-    }
-    return m;
-  }
-  std::vector<std::uint32_t> kept(FusedPlanes planes) const {
-    std::vector<std::uint32_t> result(size());
-    result.resize(
-        simd::fusedFilter(vertices[0].t0, quads.data(), size(), kind == PairKind::EDGE_EDGE, planes, result.data()));
-    return result;
-  }
-};
+std::vector<std::uint32_t> keptOf(const PairList& list, FusedPlanes planes) {
+  std::vector<std::uint32_t> kept(list.size());
+  kept.resize(simd::fusedFilter(list.vertices[0].t0, list.pairs[0].data(), list.size(),
+                                list.kind == PairKind::EDGE_EDGE, planes, kept.data()));
+  return kept;
+}
 
 std::vector<bool> asMask(const std::vector<std::uint32_t>& kept, std::size_t n) {
   std::vector<bool> mask(n, false);
@@ -173,12 +149,12 @@ PairList mixedPairs(PairKind kind, std::size_t count, std::uint64_t seed) {
 TEST(FusedFilter, RejectsWhatTheReferenceCertifies) {
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     const PairList list = mixedPairs(kind, 30000, 3);
-    const std::vector<bool> coordinate = asMask(list.kept(FusedPlanes::COORDINATE), list.size());
-    const std::vector<bool> adaptive = asMask(list.kept(FusedPlanes::ADAPTIVE), list.size());
-    const std::vector<bool> all = asMask(list.kept(FusedPlanes::ALL), list.size());
+    const std::vector<bool> coordinate = asMask(keptOf(list, FusedPlanes::COORDINATE), list.size());
+    const std::vector<bool> adaptive = asMask(keptOf(list, FusedPlanes::ADAPTIVE), list.size());
+    const std::vector<bool> all = asMask(keptOf(list, FusedPlanes::ALL), list.size());
     std::size_t rejected = 0, close = 0;
     for (std::size_t i = 0; i < list.size(); ++i) {
-      const Reference reference(kind, list.motion(i));
+      const Reference reference(kind, motionOf(list, i));
       const long double certificate = reference.coordinatePlanes();
       if (!coordinate[i]) {
         ASSERT_GT(certificate, 0) << toString(kind) << " pair " << i;
@@ -210,10 +186,10 @@ TEST(FusedFilter, EveryTargetKeepsTheSame) {
       RandomSource random(count);
       for (int i = 0; i < 100; ++i) list.add(hardQuery(random, kind, static_cast<Hardness>(i % 15)).motion);
       for (const FusedPlanes planes : {FusedPlanes::COORDINATE, FusedPlanes::ADAPTIVE, FusedPlanes::ALL}) {
-        const auto expected = list.kept(planes);
+        const auto expected = keptOf(list, planes);
         ASSERT_TRUE(std::is_sorted(expected.begin(), expected.end()));
         forEachSimdTarget(
-            [&](const std::string& target) { ASSERT_EQ(list.kept(planes), expected) << target << count; });
+            [&](const std::string& target) { ASSERT_EQ(keptOf(list, planes), expected) << target << count; });
       }
     }
   }
@@ -270,22 +246,15 @@ std::size_t expectNoContactLost(const PairList& list, const std::string& what) {
   AccuracyOptions options;
   const auto exact = makeRung(options);
   std::vector<ElementaryResult> truth(list.size());
-  std::vector<Quad> quads(list.size());
-  for (std::size_t i = 0; i < quads.size(); ++i) std::copy_n(&list.quads[4 * i], 4, quads[i].begin());
-  PairBatch batch;
-  batch.kind = list.kind;
-  batch.vertices = list.vertices.data();
-  batch.pairs = quads.data();
-  batch.count = quads.size();
   TierCounters counters;
-  exact->run(batch, truth.data(), counters);
+  exact->run(batchOf(list), truth.data(), counters);
   std::size_t contacts = 0;
-  const std::vector<bool> kept = asMask(list.kept(FusedPlanes::ALL), list.size());
+  const std::vector<bool> kept = asMask(keptOf(list, FusedPlanes::ALL), list.size());
   for (std::size_t i = 0; i < list.size(); ++i) {
     const bool contact = truth[i].verdict == Verdict::CONTACT;
     contacts += contact;
     if (!contact || kept[i]) continue;
-    EXPECT_FALSE(firstContact(list.kind, list.motion(i)).has_value())
+    EXPECT_FALSE(firstContact(list.kind, motionOf(list, i)).has_value())
         << what << ": a true contact is culled, pair " << i;
   }
   return contacts;
@@ -326,7 +295,7 @@ bool isKept(PairKind kind, const double (&origin)[3], const double (&a)[3], cons
   }
   PairList list(kind);
   list.add(pair);
-  return !list.kept(planes).empty();
+  return !keptOf(list, planes).empty();
 }
 
 // Features at rest in a coordinate plane, a = b = (1,0,0), c = (0,x,0) from the origin: n.bc = x, n.ca = -x, all else
