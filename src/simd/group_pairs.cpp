@@ -210,9 +210,8 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
     if (p + 2 < count) {
-      const uint32_t a_soon = group_pairs[2 * p + 4], b_soon = group_pairs[2 * p + 5];
-      if (a_soon != g) prefetch<T0_ONLY>(a, a_soon);
-      if (b_soon != h) prefetch<T0_ONLY>(b, b_soon);
+      prefetch<T0_ONLY>(a, group_pairs[2 * p + 4]);
+      prefetch<T0_ONLY>(b, group_pairs[2 * p + 5]);
     }
     const size_t next = p + 1 < count ? p + 1 : p;
     left_out.next(group_pairs[2 * next], group_pairs[2 * next + 1]);

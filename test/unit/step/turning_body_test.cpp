@@ -208,7 +208,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
   Positions rough;  // faces near to many others, and through none
   for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
     rough.emplace_back(0.01 * static_cast<double>(i % SIZE), 0.01 * static_cast<double>(i / SIZE),
-                       -1.01 - 0.5 * static_cast<double>(i * 7919 % 7));
+                       -1.01 - static_cast<double>(i * 7919 % 7));
   }
   int at = 0;
   const auto next = [&](Monitor& monitor) {
