@@ -53,10 +53,13 @@ class MapsTest(AttackTest):
     def assert_given_back(self):
         self.give(checkerboard(1))
         self.assertTrue(self.contacts[-1].answered, self.contacts[-1].reason)
-        left = (resident_kb(self.node.pid) - self.started_kb) / 1024
-        print('%s: %.1f MB left' % (self.id().split('.')[-1], left))
-        if SLOW == 1:
-            self.assertLess(left, 20)
+
+        def left_mb():
+            return (resident_kb(self.node.pid) - self.started_kb) / 1024
+
+        if SLOW == 1:  # on a busy machine it may take a moment
+            wait_for(lambda: left_mb() < 20, 5, 'memory to be given back')
+        print('%s: %.1f MB left' % (self.id().split('.')[-1], left_mb()))
 
     def assert_refused(self, outcome):
         self.assertEqual(outcome.status, ContactArray.NO_MAP, outcome.reason)
