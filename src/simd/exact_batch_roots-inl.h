@@ -103,13 +103,13 @@ struct MoveTogether {
   }
 };
 
+/// Every pair's root_lo is in [0,1], so that the conversion is defined: of a pair without a root it is 0 or another's.
 HWY_INLINE void writeOut(const RootBlock& roots, std::size_t j, double cells, const BatchOutput& out) {
   const std::size_t pair = roots.pair[j];
   out.verdict[pair] = static_cast<std::uint8_t>(roots.outcome[j]);
   out.lo[pair] = roots.root_lo[j];
   out.hi[pair] = roots.root_hi[j];
-  const double lo = roots.root_lo[j];  // a leftover where no root was refined: the conversion is defined all the same
-  out.cell[pair] = lo >= 0 && lo <= 1 ? static_cast<std::uint64_t>(lo * cells) : 0;
+  out.cell[pair] = static_cast<std::uint64_t>(roots.root_lo[j] * cells);
 }
 
 /// Leaves a pair to subdivision, which starts afresh; solves what is there when the block is full.
@@ -199,6 +199,8 @@ HWY_INLINE void split(SplitBlock& roots, std::size_t i) {
   }
   store(constant(-1), roots.current, i);
   store(constant(ROOT_NO_CONTACT), roots.outcome, i);
+  store(hn::Zero(Tag()), roots.root_lo, i);
+  store(hn::Zero(Tag()), roots.root_hi, i);
 }
 
 /// Pairs with perhaps several roots: one after the other, until one is a contact or none is left.
