@@ -149,6 +149,7 @@ void ClearanceFinder::learn(const Body& body, const SceneBody& scene_body, BodyS
   if (!state.tree.isBuilt()) state.tree.build(scene_body, *body.t0);
   if (!meetsItself(body) || state.tree.empty() || state.self_m == options_.self_m) return;
   const bool has_reference = body.reference && body.reference->positions.size() == vertices;
+  state.self_m = 0;  // should memory end, they are half of one and half of the other
   state.neighbours.set(*body.topology, has_reference ? body.reference->positions : *state.first_t0, options_.self_m,
                        state.tree);
   state.self_m = options_.self_m;

@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <new>
 
 #include "support/closed_meshes.h"
 #include "support/detector.h"
 #include "support/step_support.h"
+#include "unit/allocations.h"
 
 namespace dccd {
 namespace test {
@@ -375,6 +377,32 @@ TEST(Clearance, IsTheSameBitsWhateverComputesIt) {
     const bool itself = plain[i].body[0] == plain[i].body[1];
     EXPECT_TRUE(itself || sameBits(plain[i], carried.clearances[i])) << "row " << i;
   }
+}
+
+// Another self_m that could not be prepared for, and then the one before: its neighbours are not half of the other's.
+TEST(Clearance, OfAFoldIsTheSameAfterAllocationsThatFailed) {
+  const Step step = stepOf(bodyOf("cloth", Topology::grid(3, 21)), folded(0.07), folded(0.05));
+  Options options = asking(), wider = asking();
+  options.clearance.self_m = 0.45;
+  wider.clearance.self_m = 5;
+  const std::vector<Clearance> expected = distance(step, options);
+  bool met = true;
+  int n = 0;
+  for (; met; ++n) {
+    History history;
+    detect(step, options, history);
+    {
+      const AllocationFailure failure(n, false);
+      try {
+        detect(step, wider, history);
+      } catch (const std::bad_alloc&) {
+      }
+      met = failure.met();
+    }
+    expectSame(detect(step, options, history).clearances, expected, "allocation " + std::to_string(n));
+    ASSERT_FALSE(HasFailure());
+  }
+  EXPECT_GT(n, 50);
 }
 
 /// A sheet that bends a little more in each step until its ends meet, and opens again: what is known of the steps
