@@ -211,7 +211,7 @@ void SceneArrays::copyPiece(const Step& step, Piece& piece) {
 }
 
 /// Whether some body is kept.
-bool SceneArrays::closeCopies(const Step& step, bool bounds_valid, StepStats& stats) {
+bool SceneArrays::closeCopies(const Step& step, bool bounds_valid, StepStats& stats) try {
   bool any_kept = false;
   Piece* piece = pieces_.data();
   Piece* const end = piece + pieces_.size();
@@ -226,6 +226,10 @@ bool SceneArrays::closeCopies(const Step& step, bool bounds_valid, StepStats& st
     any_kept |= bodies_[b].kept;
   }
   return any_kept;
+} catch (...) {
+  constexpr std::uint8_t NOT_KNOWN = 2;  // other than what the next copy finds: all masks are made anew
+  for (SceneBody& body : bodies_) std::fill(body.active.begin(), body.active.end(), NOT_KNOWN);
+  throw;
 }
 
 void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::array<Piece*, 2>& pieces, bool bounds_valid,
@@ -273,17 +277,21 @@ void SceneArrays::sew(SceneBody& body, const Body& motion, bool all_finite) cons
   if (body.unchanged && body.sewn_known) return;
   const auto present =
       std::count_if(bodies_.begin(), bodies_.end(), [](const SceneBody& one) { return !one.passed_by; });
-  body.sewn_known = all_finite && present > 1;
-  body.sewn = false;
-  if (!all_finite || body.setup.topology->isClosed() || body.setup.shell || present < 2) return;
-  if (body.seams.vertices.empty() || !hold(body.seams, *motion.t0, *motion.t1)) {
-    body.seams = seamsOf(*body.setup.topology, *motion.t0, *motion.t1, body.seams);
-    body.repeated_slot.clear();
-    for (const Index rank : body.rank(FeatureKind::FACE)) {
-      if (!body.seams.vertices.empty()) body.repeated_slot.push_back(body.seams.repeated[face_order_[rank]]);
+  const bool known = all_finite && present > 1;
+  body.sewn_known = body.sewn = false;  // should memory end
+  if (known && !body.setup.topology->isClosed() && !body.setup.shell) {
+    if (body.seams.vertices.empty() || !hold(body.seams, *motion.t0, *motion.t1)) {
+      Seams seams = seamsOf(*body.setup.topology, *motion.t0, *motion.t1, body.seams);
+      body.seams = Seams();
+      body.repeated_slot.clear();
+      for (const Index rank : body.rank(FeatureKind::FACE)) {
+        if (!seams.vertices.empty()) body.repeated_slot.push_back(seams.repeated[face_order_[rank]]);
+      }
+      body.seams = std::move(seams);
     }
+    body.sewn = !body.seams.vertices.empty();
   }
-  body.sewn = !body.seams.vertices.empty();
+  body.sewn_known = known;
 }
 
 void SceneArrays::spanPiece(Piece& piece) const {

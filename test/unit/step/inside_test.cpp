@@ -5,10 +5,12 @@
 
 #include <cmath>
 #include <limits>
+#include <new>
 
 #include "dccd/stream.h"
 #include "support/closed_meshes.h"
 #include "support/step_truth.h"
+#include "unit/allocations.h"
 
 namespace dccd {
 namespace test {
@@ -110,6 +112,49 @@ TEST(Inside, OneBoxHasOneAnswerHoweverItsCornersAreNumbered) {
     for (Vec3& p : *x) p[2] -= 3;
   }
   EXPECT_EQ(startOf(layers).start_state, StartState::CLEAR) << "under it, with all layers above";
+}
+
+/// `last`, after `before` and an attempt at it in which one allocation after the other fails, is answered as ever.
+void expectNothingHalfDone(const std::vector<Step>& before, const Step& last) {
+  History fresh;
+  const Outcome expected = detect(last, Options(), fresh);
+  int n = 0;
+  for (bool met = true; met && !testing::Test::HasFailure(); ++n) {
+    History history;
+    for (const Step& step : before) detect(step, Options(), history);
+    {
+      const AllocationFailure failure(n, false);
+      try {
+        detect(last, Options(), history);
+      } catch (const std::bad_alloc&) {
+      }
+      met = failure.met();
+    }
+    const Outcome outcome = detect(last, Options(), history);
+    EXPECT_TRUE(same(outcome.intersections, expected.intersections)) << "allocation " << n;
+    EXPECT_EQ(difference(outcome.contacts, expected.contacts), "") << "allocation " << n;
+  }
+  EXPECT_GT(n, 50);
+}
+
+TEST(Inside, IsFoundAfterAnAllocationThatFailedWhileSeamsWereSought) {
+  TestStep step = clothInABox();
+  step.bodies[1] = withOwnCorners(step.bodies[1]);
+  ASSERT_TRUE(same(startOf(step).intersections, {insideOf(0, 0, 1)}));
+  expectNothingHalfDone({}, step.motion());
+}
+
+TEST(Inside, WhatIsLeftOutIsThatOfTheStepAfterAnAllocationThatFailedWhileSeamsWereSought) {
+  TestStep open;
+  open.bodies = {withOwnCorners(box({-1, -1, -1}, {1, 1, 1})), clothAt({0.2, 0.1, 0})};
+  for (Vec3& p : open.bodies[1].t1) p[2] += 3;
+  TestStep closed = open;
+  open.bodies[0].t0[5][0] += 0.1;
+  open.bodies[1].t0[0][0] = NAN_M;
+  closed.bodies[1].t0[7][0] = NAN_M;
+  const Outcome outcome = startOf(closed);
+  ASSERT_FALSE(outcome.contacts.empty());
+  expectNothingHalfDone({open.motion()}, closed.motion());
 }
 
 TEST(Inside, CornersThatAreNotAtOnePlaceThroughoutTheStepAreABorder) {
