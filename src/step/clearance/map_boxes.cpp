@@ -4,10 +4,11 @@ namespace dccd {
 
 void MapBoxes::set(std::shared_ptr<const VoxelSurface> surface) {
   if (surface == surface_) return;
-  surface_ = std::move(surface);
-  const double resolution_m = surface_->resolution();
+  surface_ = nullptr;  // until all boxes are made: memory may end
+  const VoxelTree& tree = surface->impl().tree;
+  const double resolution_m = surface->resolution();
   for (int level = 0; level < VoxelTree::LEVELS; ++level) {
-    const std::vector<VoxelTree::Node>& nodes = tree().nodes(level);
+    const std::vector<VoxelTree::Node>& nodes = tree.nodes(level);
     boxes_[level].resize(nodes.size());
     for (std::uint32_t number = 0; number < nodes.size(); ++number) {
       const VoxelTree::Node& node = nodes[number];
@@ -18,7 +19,7 @@ void MapBoxes::set(std::shared_ptr<const VoxelSurface> surface) {
           int first = 0, last = 3;
           while ((node.full & RANGE_MASKS[axis][first][first]) == 0) ++first;
           while ((node.full & RANGE_MASKS[axis][last][last]) == 0) --last;
-          const std::int64_t origin = std::int64_t{tree().nodeCell(level, number)[axis]} << (2 * (level + 1));
+          const std::int64_t origin = std::int64_t{tree.nodeCell(level, number)[axis]} << (2 * (level + 1));
           lo[axis] = voxelPlane(origin + (std::int64_t{first} << (2 * level)), resolution_m);
           hi[axis] = voxelPlane(origin + (std::int64_t{last + 1} << (2 * level)), resolution_m);
         }
@@ -30,6 +31,7 @@ void MapBoxes::set(std::shared_ptr<const VoxelSurface> surface) {
       boxes_[level][number] = box;
     }
   }
+  surface_ = std::move(surface);
 }
 
 }  // namespace dccd
