@@ -202,9 +202,9 @@ void InsideSearch::remember(const SceneArrays& scene, const std::vector<Contact>
 /// By joining sets; the one with the smallest number of a set stands for it.
 const std::vector<InsideSearch::Piece>& InsideSearch::piecesOf(const SceneArrays& scene, std::size_t b) {
   pieces_.resize(scene.bodies().size());
-  std::vector<Piece>& pieces = pieces_[b];
   const SceneBody& body = scene.bodies()[b];
-  if (!pieces.empty() || body.usedCount() == 0) return pieces;
+  if (!pieces_[b].empty() || body.usedCount() == 0) return pieces_[b];
+  std::vector<Piece> pieces;
   std::vector<Index> first(body.usedCount());  // by internal number: one that is joined with it, itself at the end
   std::iota(first.begin(), first.end(), Index{0});
   const auto find = [&](Index i) {
@@ -222,7 +222,7 @@ const std::vector<InsideSearch::Piece>& InsideSearch::piecesOf(const SceneArrays
     if (first[i] == i && body.active[i]) pieces.push_back({body.slot_vertex[i], body.internal_begin + i});
   }
   std::sort(pieces.begin(), pieces.end(), [](const Piece& x, const Piece& y) { return x.vertex < y.vertex; });
-  return pieces;
+  return pieces_[b] = std::move(pieces);
 }
 
 void InsideSearch::clear() {

@@ -144,6 +144,13 @@ TEST(Inside, IsFoundAfterAnAllocationThatFailedWhileSeamsWereSought) {
   expectNothingHalfDone({}, step.motion());
 }
 
+TEST(Inside, EveryPieceIsFoundAfterAnAllocationThatFailedWhileTheyWereListed) {
+  TestStep step = clothInABox();
+  for (int i = 0; i < 4; ++i) step.bodies[0] = together(step.bodies[0], clothAt({0.2, 0.1, 0.1 + 0.1 * i}));
+  ASSERT_EQ(startOf(step).intersections.size(), 5u);
+  expectNothingHalfDone({}, step.motion());
+}
+
 TEST(Inside, WhatIsLeftOutIsThatOfTheStepAfterAnAllocationThatFailedWhileSeamsWereSought) {
   TestStep open;
   open.bodies = {withOwnCorners(box({-1, -1, -1}, {1, 1, 1})), clothAt({0.2, 0.1, 0})};
