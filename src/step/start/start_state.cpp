@@ -153,7 +153,7 @@ bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const std::vector<
     const auto first = pairs.end() - static_cast<std::ptrdiff_t>(std::min(block, pairs.size()));
     std::sort(first, pairs.end());
     const auto last = std::unique(first, pairs.end());
-    const bool goes_on = test(&*first, static_cast<std::size_t>(last - first));
+    const bool goes_on = test(pairs.data() + (first - pairs.begin()), static_cast<std::size_t>(last - first));
     pairs.erase(first, pairs.end());
     if (!goes_on) return false;
   }
