@@ -228,7 +228,10 @@ bool SceneArrays::closeCopies(const Step& step, bool bounds_valid, StepStats& st
   return any_kept;
 } catch (...) {
   constexpr std::uint8_t NOT_KNOWN = 2;  // other than what the next copy finds: all masks are made anew
-  for (SceneBody& body : bodies_) std::fill(body.active.begin(), body.active.end(), NOT_KNOWN);
+  for (SceneBody& body : bodies_) {
+    std::fill(body.active.begin(), body.active.end(), NOT_KNOWN);
+    body.recorded = false;  // what it is known to be is not of what was copied
+  }
   throw;
 }
 

@@ -151,6 +151,18 @@ TEST(Inside, EveryPieceIsFoundAfterAnAllocationThatFailedWhileTheyWereListed) {
   expectNothingHalfDone({}, step.motion());
 }
 
+TEST(Inside, SeamsThatComeApartAreApartAfterAnAllocationThatFailedForAnotherBody) {
+  TestStep sewn = clothInABox();
+  sewn.bodies[1] = withOwnCorners(sewn.bodies[1]);
+  sewn.bodies.insert(sewn.bodies.begin(), withOwnCorners(box({4, 4, 4}, {5, 5, 5})));
+  TestStep apart = sewn;
+  apart.bodies[2].t1[5][0] += 0.1;
+  sewn.bodies[0].t0[5][0] += 0.1;  // what is sought anew
+  ASSERT_EQ(startOf(sewn).start_state, StartState::INTERSECTING);
+  ASSERT_EQ(startOf(apart).start_state, StartState::CLEAR);
+  expectNothingHalfDone({sewn.motion()}, apart.motion());
+}
+
 TEST(Inside, WhatIsLeftOutIsThatOfTheStepAfterAnAllocationThatFailedWhileSeamsWereSought) {
   TestStep open;
   open.bodies = {withOwnCorners(box({-1, -1, -1}, {1, 1, 1})), clothAt({0.2, 0.1, 0})};
