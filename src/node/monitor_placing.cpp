@@ -14,7 +14,7 @@ namespace dccd {
 namespace {
 
 SeenPose unknownAt(StampNs stamp_ns) {
-  SeenPose seen{stamp_ns, {}};
+  SeenPose seen{stamp_ns, Eigen::Isometry3d::Identity()};
   seen.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
   return seen;
 }
