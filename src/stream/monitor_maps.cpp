@@ -73,10 +73,10 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
   while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].map.stamp_ns > known_until_ns) --taken;
   if (bodies_tracked.empty()) own_voxels.forget();
   for (; taken > 0; --taken) {
-    const MapToCome next = std::move(maps_to_come.front());
-    maps_to_come.pop_front();
+    const MapToCome& next = maps_to_come.front();
     if (next.after_missed) own_voxels.missMaps();
     takeMap(next.map, bodies_tracked);
+    maps_to_come.pop_front();  // should memory end before, the next step takes it
   }
 }
 

@@ -177,7 +177,7 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface,
 /// Says of each cube, by whether a body reached it, what it is from now on: own, in doubt, remembered or none of these.
 void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
                             const std::set<int>& unknown_yet) {
-  remembered_.clear();
+  std::vector<OccupiedLeaf> remembered;
   for (const ReachedCube& cube : cubes) {
     const bool reached = cube.body >= 0;
     const std::uint64_t key = packed(cube.leaf.min);
@@ -189,7 +189,7 @@ void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSp
         break;
       case ReachedCube::Why::VANISHED:
       case ReachedCube::Why::REMEMBERED:
-        if (reached || !isSeenFree(known, cube.box)) remembered_.push_back(cube.leaf);
+        if (reached || !isSeenFree(known, cube.box)) remembered.push_back(cube.leaf);
         break;
       case ReachedCube::Why::DOUBTED:
         if (!reached) own_.erase(key);
@@ -197,6 +197,7 @@ void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSp
         break;
     }
   }
+  remembered_ = std::move(remembered);  // at once: where memory ends before, the same map comes again
   // One that was not looked at may have shown it free, or before the body came near.
   if (missed_ && !trust_first) {
     for (auto& one : own_) one.second.doubted = true;
@@ -225,9 +226,9 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
     if (is_older) unknown_yet.insert(body.body);
   }
   follow(cubes, map.known.get(), trust_first, unknown_yet);
+  frame_id_ = map.frame_id;
   before_ = map.surface;
   before_ns_ = map.stamp_ns;
-  frame_id_ = map.frame_id;
 
   ObstacleMap reduced = map;
   reduced.own.looked_at = static_cast<std::uint64_t>(std::count_if(

@@ -194,6 +194,7 @@ bool decide(const Points& x) {
 
 void segmentsMeetTriangles(const double* positions, const std::array<std::uint32_t, 5>* pairs, std::size_t count,
                            std::uint8_t* meet) {
+  if (count == 0) return;  // of no pairs there may be no array
   simd::segmentFilter(positions, pairs->data(), count, meet);
   for (std::size_t i = 0; i < count; ++i) {
     if (meet[i] != simd::SEGMENT_UNDECIDED) continue;

@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <new>
 #include <set>
 
 #include "dccd/assurance.h"
+#include "unit/allocations.h"
 #include "unit/stream/monitor_support.h"
 
 namespace dccd {
@@ -127,6 +129,32 @@ TEST_F(OwnVoxels, WhatWasThereBeforeStaysAnObstacle) {
   const Outcome on = feed(400 * MS, 0.09);
   EXPECT_EQ(assuranceOf(on).touching, Touching::NEW);
   EXPECT_NEAR(on.earliest_toc, 2.0 / 3, 1e-6);
+}
+
+/// The step that takes a map fails at one allocation after the other; the next one has it, or proves nothing.
+TEST_F(OwnVoxels, AMapOfAStepThatFailedIsNotLost) {
+  int n = 0;
+  for (bool met = true; met && !HasFailure(); ++n) {
+    SetUp();
+    hoverAboveFloor();
+    map(150 * MS, slab(1) + voxelsOf(0.25));
+    monitor_->countReceived(0);
+    monitor_->push(0, sheet(200 * MS, 0.55), NOW);
+    Outcome outcome;
+    {
+      const AllocationFailure failure(n, false);
+      try {
+        monitor_->next(NOW, outcome);
+      } catch (const std::bad_alloc&) {  // not even that could be told: it is done again
+      }
+      met = failure.met();
+    }
+    while (monitor_->next(NOW, outcome)) {
+    }
+    const Outcome later = feed(300 * MS, 0.22);
+    EXPECT_EQ(assuranceOf(later).touching, Touching::NEW) << "allocation " << n;
+  }
+  EXPECT_GT(n, 10);
 }
 
 TEST_F(OwnVoxels, WhatIsOwnStaysSoUntilAMapHasClearedIt) {
