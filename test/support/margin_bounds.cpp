@@ -84,7 +84,10 @@ MarginInput viewInput(RandomSource& random) {
 
 IsWrong judgeView(const MarginInput& input) {
   return [input] {
-    const ViewPlane plane(V3(input.x[0], input.x[1], input.x[2]));
+    const V3 along = V3(input.x[0], input.x[1], input.x[2]).normalized();
+    ViewPlane plane(V3::UnitX());
+    plane.u = along.unitOrthogonal();  // any plane, more than those that are seen in
+    plane.w = along.cross(plane.u);
     const double* point = input.x.data() + 3;
     const std::array<double, 2> seen = plane.coordinates(point);
     const Rational error = exact(ViewPlane::error(V3(point[0], point[1], point[2]).lpNorm<1>()));
