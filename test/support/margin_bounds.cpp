@@ -12,6 +12,7 @@
 #include "oracle/oracle.h"
 #include "support/margin_numbers.h"
 #include "support/margin_pairs.h"
+#include "support/pair_list.h"
 
 namespace dccd {
 namespace test {
@@ -64,7 +65,9 @@ IsWrong judgeBound(const MarginInput& input) {
   if (!(separation >= 0)) return [] { return false; };
   std::optional<Root> toc = separation == 0 ? firstContact(kind, motion) : std::nullopt;
   return [=]() mutable {
-    const double bound = linearTocBound(kind, motion, separation);
+    PairList pair(kind);
+    pair.add(motion);
+    const double bound = linearTocBound(kind, pair.vertices.data(), pair.pairs[0], separation);
     if (separation == 0) {
       return toc && (bound > 1 || toc->compareWith(Dyadic::fromDouble(bound)) < 0);
     }
