@@ -22,12 +22,12 @@ const PlaneDirections PLANE;
 
 }  // namespace
 
-ViewPlane ViewPlane::alongLine(const Vec3& line) {
-  ViewPlane plane;
-  plane.u = line.cross(line.x() == 0 ? Vec3::UnitX() : line.y() == 0 ? Vec3::UnitY() : Vec3::UnitZ());
-  plane.w = line.cross(plane.u);  // u x w = |u|^2 line
-  if (plane.w.cwiseAbs().maxCoeff() > 1) plane.w /= 2;
-  return plane;
+ViewPlane::ViewPlane(const Vec3& line)
+    : u(line.cross(line.x() == 0   ? Vec3::UnitX()
+                   : line.y() == 0 ? Vec3::UnitY()
+                                   : Vec3::UnitZ())),
+      w(line.cross(u)) {  // u x w = |u|^2 line
+  if (w.cwiseAbs().maxCoeff() > 1) w /= 2;
 }
 
 PlanarSpan::Point PlanarSpan::add(const ViewPlane& plane, const VertexMotion& vertex) {

@@ -15,9 +15,8 @@ namespace dccd {
 /// The plane that a surface is seen in: (u . x, w . x), for which the certificate holds with these very doubles. It is
 /// seen along u x w.
 struct ViewPlane {
-  explicit ViewPlane(const Vec3& along) : u(along.normalized().unitOrthogonal()), w(along.normalized().cross(u)) {}
   /// Along a line of components -1, 0 and 1, exactly: u and w have components 0, 1/2 and 1, or their opposites.
-  static ViewPlane alongLine(const Vec3& line);
+  explicit ViewPlane(const Vec3& line);
   std::array<double, 2> coordinates(const double* x) const {
     const Eigen::Map<const Vec3> p(x);
     return {u.dot(p), w.dot(p)};
@@ -27,9 +26,6 @@ struct ViewPlane {
   static double error(double size) { return tolerance::UNFOLDED_COORDINATE * size; }
 
   Vec3 u, w;
-
- private:
-  ViewPlane() = default;
 };
 
 /// Points in a plane, as they come: what their coordinates, and products of two of their differences, are off by.

@@ -30,7 +30,15 @@ double meets(double u0, double u1, double l0, double l1, double margin) {
   return t > 0 ? std::min(t, 1.0) : 0;
 }
 
-double bound(const double (*p0)[8], const double (*p1)[8], int first_count, double separation) {
+}  // namespace
+
+double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& pair, double minimum_separation_m) {
+  double p0[4][8], p1[4][8];
+  for (int i = 0; i < 4; ++i) {
+    simd::project(vertices[pair[i]].t0, p0[i]);
+    simd::project(vertices[pair[i]].t1, p1[i]);
+  }
+  const int first_count = factsOf(kind).vertices[0];
   // At t=0, per direction: what meets there has no say. That leaves few directions, and few divisions.
   double low_a[8], high_a[8], low_b[8], high_b[8];
   for (int d = 0; d < 8; ++d) {
@@ -42,7 +50,8 @@ double bound(const double (*p0)[8], const double (*p1)[8], int first_count, doub
   }
   double latest = 0;
   for (int d = 0; d < 8; ++d) {
-    const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * (1 + tolerance::TOC_BOUND) : 0;
+    const double margin =
+        minimum_separation_m > 0 ? minimum_separation_m * (d < 3 ? 1.0 : SQRT2_UP) * (1 + tolerance::TOC_BOUND) : 0;
     if (!(low_a[d] - margin > high_b[d]) && !(low_b[d] - margin > high_a[d])) continue;
     // Every vertex of one feature against every vertex of the other; the features' projections meet when the first pair
     // of opposite ends does. What is not later than the best so far needs no further look.
@@ -58,26 +67,6 @@ double bound(const double (*p0)[8], const double (*p1)[8], int first_count, doub
     }
   }
   return latest;
-}
-
-}  // namespace
-
-double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& pair, double minimum_separation_m) {
-  double p0[4][8], p1[4][8];
-  for (int i = 0; i < 4; ++i) {
-    simd::project(vertices[pair[i]].t0, p0[i]);
-    simd::project(vertices[pair[i]].t1, p1[i]);
-  }
-  return bound(p0, p1, factsOf(kind).vertices[0], minimum_separation_m);
-}
-
-double linearTocBound(PairKind kind, const PairMotion& pair, double minimum_separation_m) {
-  double p0[4][8], p1[4][8];
-  for (int i = 0; i < 4; ++i) {
-    simd::project(pair.x[0][i], p0[i]);
-    simd::project(pair.x[1][i], p1[i]);
-  }
-  return bound(p0, p1, factsOf(kind).vertices[0], minimum_separation_m);
 }
 
 }  // namespace dccd

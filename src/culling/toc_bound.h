@@ -11,7 +11,4 @@ namespace dccd {
 /// minimum_separation_m: contact already at this distance.
 double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& pair, double minimum_separation_m);
 
-/// The same for a PairMotion.
-double linearTocBound(PairKind kind, const PairMotion& pair, double minimum_separation_m);
-
 }  // namespace dccd

@@ -15,7 +15,7 @@ using simd::GROUP;
 constexpr std::size_t RUNS_LEFT_OUT = 15, MOST_LEFT_OUT = 127;
 constexpr std::size_t FEW = 8;  // one in so many of the cells beside each other is next to nothing
 constexpr std::size_t MOST_PARTS = 64;
-constexpr std::size_t SAMPLES = 256;           // faces that give the mean normal; pairs of cells that choose a view
+constexpr std::size_t SAMPLES = 256;           // pairs of cells that choose a view
 constexpr std::size_t FEWEST_CELLS = 16;       // of a part of a surface
 constexpr std::size_t PAIRS_A_DIRECTION = 32;  // one in so many of the cells beside each other are worth a direction
 constexpr std::size_t LEAST_BUDGET = 4096;     // edges of borders that are tested in a run, or one for each cell
@@ -28,24 +28,9 @@ constexpr std::size_t LONG_BORDER = 1024;  // edges
 constexpr std::size_t CELLS_A_PIECE = 256, CELLS_AT_ONCE = 32;
 constexpr std::uint32_t ALL_VIEWS = (1u << simd::VIEWS) - 1;
 
-Vec3 normalAt(const double (&a)[4], const double (&b)[4], const double (&c)[4]) {
-  const Eigen::Map<const Vec3> p(a), q(b), r(c);
-  return (q - p).cross(r - p);
-}
-
-/// Bernstein coefficients of the face's area over the step, the middle one doubled, are positive.
-bool keepsOrientation(const PlanarSpan::Point& a, const PlanarSpan::Point& b, const PlanarSpan::Point& c,
-                      double margin) {
-  const double px0 = b.x0 - a.x0, py0 = b.y0 - a.y0, qx0 = c.x0 - a.x0, qy0 = c.y0 - a.y0;
-  const double px1 = b.x1 - a.x1, py1 = b.y1 - a.y1, qx1 = c.x1 - a.x1, qy1 = c.y1 - a.y1;
-  const double first = px0 * qy0 - py0 * qx0, last = px1 * qy1 - py1 * qx1;
-  const double middle = (px0 * qy1 - py0 * qx1) + (px1 * qy0 - py1 * qx0);
-  return first > margin && last > margin && middle > 3 * margin;
-}
-
 ViewPlane planeOf(std::size_t view) {
   const int* line = simd::VIEW_LINE[view / 2];
-  return ViewPlane::alongLine((view % 2 ? -1.0 : 1.0) * Vec3(line[0], line[1], line[2]));
+  return ViewPlane((view % 2 ? -1.0 : 1.0) * Vec3(line[0], line[1], line[2]));
 }
 
 }  // namespace
@@ -76,7 +61,7 @@ class Unfolded::Search {
     part_count_ = 0;
     whole = false;
     vertices_ = vertices;
-    if (left_out_runs_ > 0 && !(cells_.isWhole() && findNormal(body))) {
+    if (left_out_runs_ > 0) {
       --left_out_runs_;
       return 0;
     }
@@ -85,8 +70,7 @@ class Unfolded::Search {
     is_first_run_ = false;
     rest();
     findViews(body.tree(FeatureKind::FACE), parallel);
-    const bool one = certifyMost();
-    whole = cells_.isWhole() && (one || (findNormal(body) && isWholeAlongNormal(body)));
+    whole = certifyMost() && cells_.isWhole();
     if (!whole && cells_.count() >= FEWEST_CELLS) certifyRest();
     return part_count_;
   }
@@ -142,10 +126,10 @@ class Unfolded::Search {
     }
     const std::size_t before = part_count_;
     if (cells.size() == cells_.count()) {
-      certifyPart(cells, planeOf(direction), &view);
+      certifyPart(cells, planeOf(direction), view);
     } else {
       for (std::vector<std::uint32_t>& component : componentsOf(cells)) {
-        if (part_count_ < MOST_PARTS) certifyPart(std::move(component), planeOf(direction), &view);
+        if (part_count_ < MOST_PARTS) certifyPart(std::move(component), planeOf(direction), view);
       }
     }
     view.holds = part_count_ > before;
@@ -204,46 +188,6 @@ class Unfolded::Search {
     const bool all = cells.size() == cells_.count();
     certifyAlong(first_view_, cells);
     return all && part_count_ == 1 && std::find(parts_of_.begin(), parts_of_.end(), 0) == parts_of_.end();
-  }
-
-  /// False: the surface is certainly not to be seen from its front along its mean normal.
-  bool findNormal(const SceneBody& body) {
-    const ClusterTree& faces = body.tree(FeatureKind::FACE);
-    const std::size_t stride = std::max<std::size_t>(1, faces.featureCount() / SAMPLES);
-    const auto sampled = [&](std::size_t f, bool at_t1) {
-      const Index* v = faces.feature(f);
-      const VertexMotion &a = vertices_[v[0]], &b = vertices_[v[1]], &c = vertices_[v[2]];
-      return at_t1 ? normalAt(a.t1, b.t1, c.t1) : normalAt(a.t0, b.t0, c.t0);
-    };
-    normal_.setZero();
-    for (std::size_t f = 0; f < faces.featureCount(); f += stride) normal_ += sampled(f, false) + sampled(f, true);
-    const double length = normal_.norm();
-    if (!(length > tolerance::UNFOLDED_SMALLEST_NORMAL && length < tolerance::UNFOLDED_LARGEST_NORMAL)) return false;
-    for (std::size_t f = 0; f < faces.featureCount(); f += stride) {
-      if (!(sampled(f, false).dot(normal_) > 0 && sampled(f, true).dot(normal_) > 0)) return false;
-    }
-    return true;
-  }
-
-  bool isWholeAlongNormal(const SceneBody& body) {
-    const ViewPlane plane(normal_);
-    PlanarSpan span;
-    points_.resize(body.usedCount());
-    for (std::size_t i = 0; i < points_.size(); ++i) points_[i] = span.add(plane, vertices_[body.internal_begin + i]);
-    if (!span.isGuarded()) return false;
-    const double margin = span.productError();
-    const ClusterTree& faces = body.tree(FeatureKind::FACE);
-    for (std::size_t f = 0; f < faces.featureCount(); ++f) {
-      const Index* v = faces.feature(f);
-      const auto point = [&](int k) -> const PlanarSpan::Point& { return points_[v[k] - body.internal_begin]; };
-      if (!keepsOrientation(point(0), point(1), point(2), margin)) return false;
-    }
-    std::vector<std::uint32_t> cells(cells_.count());
-    std::iota(cells.begin(), cells.end(), 0);
-    if (certifyPart(cells, plane, nullptr) != cells_.count()) return false;
-    part_count_ = 1;
-    std::fill(parts_of_.begin(), parts_of_.end(), 1);
-    return true;
   }
 
   /// Along further directions, cells that lie beside each other in no part.
@@ -325,8 +269,7 @@ class Unfolded::Search {
     return components;
   }
 
-  /// The number of cells of the part; 0: there is none.
-  std::size_t certifyPart(std::vector<std::uint32_t> cells, const ViewPlane& plane, View* view) {
+  void certifyPart(std::vector<std::uint32_t> cells, const ViewPlane& plane, View& view) {
     for (std::size_t i = 0; i < TRIES; ++i) {
       mark(cells);
       border_.clear();
@@ -344,13 +287,13 @@ class Unfolded::Search {
       }
       // A pair of cells saves about what two edges of the border take; those of a long one meet more others in a sweep.
       const bool is_long = border_.size() > LONG_BORDER;
-      if (cells.size() < cells_.count() && 4 * won < (is_long ? 5 : 2) * border_.size()) return 0;
-      if (!canPay(border_.size())) return 0;
-      if (view) ++view->tries;
+      if (cells.size() < cells_.count() && 4 * won < (is_long ? 5 : 2) * border_.size()) return;
+      if (!canPay(border_.size())) return;
+      ++view.tries;
       if (contour_.isSimple(border_, plane, vertices_)) {
         for (const std::uint32_t c : cells) parts_of_[c] |= std::uint64_t{1} << part_count_;
         ++part_count_;
-        return cells.size();
+        return;
       }
       bad_cells_.clear();
       for (std::size_t s = 0; s < border_.size(); ++s) {
@@ -358,7 +301,7 @@ class Unfolded::Search {
         marks_[border_cell_[s]] = 0;
         bad_cells_.push_back(border_cell_[s]);
       }
-      if (view && view->tries > TRIES_BY_CELLS) {
+      if (view.tries > TRIES_BY_CELLS) {
         for (std::size_t b = 0, last = bad_cells_.size(); b < last; ++b) {
           for (auto n = cells_.firstNeighbour(bad_cells_[b]); n != cells_.lastNeighbour(bad_cells_[b]); ++n) {
             if (n->cell == SurfaceCells::BORDER || !isMarked(n->cell)) continue;
@@ -367,21 +310,18 @@ class Unfolded::Search {
           }
         }
       }
-      if (view) {
-        view->dropped.insert(view->dropped.end(), bad_cells_.begin(), bad_cells_.end());
-        const bool too_many = view->stood_against > 0 && 4 * bad_cells_.size() > view->stood_against;
-        view->stood_against = bad_cells_.size();
-        if (too_many && bad_cells_.size() > FEWEST_CELLS) view->tries = TRIES;
-        if (view->tries >= TRIES) return 0;
-      }
+      view.dropped.insert(view.dropped.end(), bad_cells_.begin(), bad_cells_.end());
+      const bool too_many = view.stood_against > 0 && 4 * bad_cells_.size() > view.stood_against;
+      view.stood_against = bad_cells_.size();
+      if (too_many && bad_cells_.size() > FEWEST_CELLS) view.tries = TRIES;
+      if (view.tries >= TRIES) return;
       cells.erase(std::remove_if(cells.begin(), cells.end(), [&](std::uint32_t c) { return !isMarked(c); }),
                   cells.end());
       std::vector<std::vector<std::uint32_t>> components = componentsOf(cells);
-      if (components.empty()) return 0;
+      if (components.empty()) return;
       const auto fewer = [](const auto& a, const auto& b) { return a.size() < b.size(); };
       cells = std::move(*std::max_element(components.begin(), components.end(), fewer));
     }
-    return 0;
   }
 
   SurfaceCells cells_;
@@ -391,12 +331,10 @@ class Unfolded::Search {
   std::uint32_t allowed_ = ALL_VIEWS;
   std::array<View, simd::VIEWS> per_view_;
   bool is_first_run_ = true;
-  std::size_t unfinished_ = 0;  // runs one after another
-  Vec3 normal_;
-  std::vector<PlanarSpan::Point> points_;  // per used vertex
-  std::vector<std::uint64_t> parts_of_;    // per cell: a bit for each part that holds it
-  std::vector<std::uint32_t> views_;       // per cell: views that all its faces face
-  std::vector<std::uint64_t> marks_;       // per cell
+  std::size_t unfinished_ = 0;           // runs one after another
+  std::vector<std::uint64_t> parts_of_;  // per cell: a bit for each part that holds it
+  std::vector<std::uint32_t> views_;     // per cell: views that all its faces face
+  std::vector<std::uint64_t> marks_;     // per cell
   std::uint64_t mark_ = 0;
   std::vector<Contour::Side> border_;
   std::vector<std::uint32_t> border_cell_, bad_cells_;

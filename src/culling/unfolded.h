@@ -44,9 +44,8 @@ std::size_t leaveOutPairs(const PartsOfGroups& a, const PartsOfGroups& b, std::s
 /// Parts are sets of cells, seen along 24 fixed directions, one after another, as long as that pays: first all that are
 /// seen from their front along the direction for which they are most, which may be the whole surface; then those that
 /// lie beside each other in no part yet, and those around them. A part whose border meets itself is tried again without
-/// the cells at such places, in the next runs, too. Directions that held a part in the last run come first. Where a
-/// part is not the whole, but the surface may be seen along its mean normal, that is tried, too. Two clusters of
-/// features are left out where one part holds both.
+/// the cells at such places, in the next runs, too. Directions that held a part in the last run come first. Two
+/// clusters of features are left out where one part holds both.
 class Unfolded {
  public:
   using Parallel =
@@ -57,8 +56,8 @@ class Unfolded {
   ~Unfolded();
   Unfolded(Unfolded&& other) noexcept;
 
-  /// The body must have no separation from itself and no inactive vertex. After a run that certified next to nothing,
-  /// parts are left out of some runs, so that a surface that is folded everywhere pays for a look at some faces.
+  /// The body must have no separation from itself and no inactive vertex. After a run that certified next to nothing
+  /// some runs are left out, so that a surface that is folded everywhere pays for one in a hundred.
   void run(const SceneBody& body, const VertexMotion* vertices, const Parallel& parallel = oneByOne);
   /// Forgets what was certified.
   void clear() { part_count_ = 0; }

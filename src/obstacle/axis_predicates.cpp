@@ -3,41 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include <gmp.h>
+#include <gmpxx.h>
 
 #include "dccd/tolerances.h"
 
 namespace dccd {
 namespace {
 
-/// A rational number; doubles convert exactly.
-class Rational {
- public:
-  explicit Rational(double value = 0) {
-    mpq_init(q_);
-    mpq_set_d(q_, value);
-  }
-  Rational(const Rational& other) {
-    mpq_init(q_);
-    mpq_set(q_, other.q_);
-  }
-  Rational& operator=(const Rational&) = delete;
-  ~Rational() { mpq_clear(q_); }
-  friend Rational operator-(const Rational& a, const Rational& b) {
-    Rational r;
-    mpq_sub(r.q_, a.q_, b.q_);
-    return r;
-  }
-  friend Rational operator*(const Rational& a, const Rational& b) {
-    Rational r;
-    mpq_mul(r.q_, a.q_, b.q_);
-    return r;
-  }
-  int sign() const { return mpq_sgn(q_); }
-
- private:
-  mpq_t q_;
-};
+using Rational = mpq_class;  // doubles convert exactly
 
 /// Products of differences above this and below its inverse neither overflow nor lose bits to underflow.
 constexpr double TINY = tolerance::PREDICATE_SMALLEST, LARGE = tolerance::PREDICATE_LARGEST;
@@ -69,7 +42,7 @@ int signOf(double value) { return (value > 0) - (value < 0); }
 
 int exactOrientation2d(double p0x, double p0y, double p1x, double p1y, double qx, double qy) {
   const Rational x0(p0x), y0(p0y);
-  return ((Rational(p1x) - x0) * (Rational(qy) - y0) - (Rational(p1y) - y0) * (Rational(qx) - x0)).sign();
+  return sgn((Rational(p1x) - x0) * (Rational(qy) - y0) - (Rational(p1y) - y0) * (Rational(qx) - x0));
 }
 
 int exactOrientation3d(const double* a, const double* b, const double* c, const double* q) {
@@ -77,9 +50,7 @@ int exactOrientation3d(const double* a, const double* b, const double* c, const 
   const Rational bx = Rational(b[0]) - ax, by = Rational(b[1]) - ay, bz = Rational(b[2]) - az;
   const Rational cx = Rational(c[0]) - ax, cy = Rational(c[1]) - ay, cz = Rational(c[2]) - az;
   const Rational qx = Rational(q[0]) - ax, qy = Rational(q[1]) - ay, qz = Rational(q[2]) - az;
-  const Rational zero;
-  const Rational nx = by * cz - bz * cy, ny = bz * cx - bx * cz, nz = bx * cy - by * cx;
-  return (nx * qx - (zero - ny * qy) - (zero - nz * qz)).sign();
+  return sgn((by * cz - bz * cy) * qx + (bz * cx - bx * cz) * qy + (bx * cy - by * cx) * qz);
 }
 
 }  // namespace
@@ -156,7 +127,7 @@ int compare(const CrossingTime& a, const CrossingTime& b) {
   }
   const Rational na = Rational(a.plane) - Rational(a.from), da = Rational(a.to) - Rational(a.from);
   const Rational nb = Rational(b.plane) - Rational(b.from), db = Rational(b.to) - Rational(b.from);
-  return (na * db - nb * da).sign() * da.sign() * db.sign();
+  return sgn(na * db - nb * da) * sgn(da) * sgn(db);
 }
 
 std::int64_t timeCell(const CrossingTime& time, int bits) {
@@ -189,7 +160,7 @@ std::int64_t timeCell(const CrossingTime& time, int bits) {
   const Rational denominator = Rational(time.to) - Rational(time.from);
   const Rational numerator = (Rational(time.plane) - Rational(time.from)) * Rational(scale);
   const auto reached = [&](std::int64_t k) {
-    return (numerator - Rational(static_cast<double>(k)) * denominator).sign() * denominator.sign() >= 0;
+    return sgn(numerator - Rational(static_cast<double>(k)) * denominator) * sgn(denominator) >= 0;
   };
   while (!reached(cell)) --cell;
   while (reached(cell + 1)) ++cell;

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "obstacle/leaf_sets.h"
 #include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
@@ -29,41 +30,19 @@ bool touchedKeys(const Box& region_m, double resolution_m, KeyBox& keys) {
   return true;
 }
 
-struct Cube {
-  std::int32_t min[3];
-  std::int32_t size;
-};
-
-enum class Overlap : std::uint8_t { NONE, PART, INSIDE };
-
-Overlap overlap(const Cube& cube, const KeyBox& keys) {
-  bool inside = true;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t last = cube.min[axis] + cube.size - 1;
-    if (last < keys.lo[axis] || cube.min[axis] > keys.hi[axis]) return Overlap::NONE;
-    inside = inside && cube.min[axis] >= keys.lo[axis] && last <= keys.hi[axis];
-  }
-  return inside ? Overlap::INSIDE : Overlap::PART;
-}
-
 /// Calls visit(cube) for the largest aligned cubes of unknown voxels in the key box, until it returns false.
 template <class Visit>
-bool visitUnknown(const VoxelTree& tree, const Cube& cube, const KeyBox& keys, Visit& visit) {
-  const Overlap common = overlap(cube, keys);
-  if (common == Overlap::NONE) return true;
-  const Coverage coverage = tree.coverage(cube.min[0], cube.min[1], cube.min[2], cube.size);
-  if (coverage == Coverage::FULL) return true;
-  if (coverage == Coverage::EMPTY && common == Overlap::INSIDE) return visit(cube);
-  const std::int32_t half = cube.size / 2;
-  for (int i = 0; i < 8; ++i) {
-    Cube child{{}, half};
-    for (int axis = 0; axis < 3; ++axis) child.min[axis] = cube.min[axis] + (i >> axis & 1 ? half : 0);
-    if (!visitUnknown(tree, child, keys, visit)) return false;
-  }
-  return true;
+bool visitUnknown(const VoxelTree& tree, const OccupiedLeaf& cube, const KeyBox& keys, Visit& visit) {
+  if (!meets(cube, keys)) return true;
+  const Coverage covered = coverage(tree, cube);
+  if (covered == Coverage::FULL) return true;
+  if (covered == Coverage::EMPTY && isInside(cube, keys)) return visit(cube);
+  const std::array<OccupiedLeaf, 8> parts = eighthsOf(cube);
+  return std::all_of(parts.begin(), parts.end(),
+                     [&](const OccupiedLeaf& part) { return visitUnknown(tree, part, keys, visit); });
 }
 
-constexpr Cube WHOLE_MAP{{0, 0, 0}, VoxelTree::KEYS};
+constexpr OccupiedLeaf WHOLE_MAP{{0, 0, 0}, VoxelTree::KEYS};
 
 /// A block of 4^3 voxels and which of them are touched.
 using TouchedBlock = std::pair<std::uint64_t, std::uint64_t>;
@@ -163,7 +142,7 @@ bool KnownSpace::isKnown(const Box& region_m) const {
   }
   KeyBox keys;
   if (!touchedKeys(region_m, impl_->resolution_m, keys)) return false;
-  const auto stop = [](const Cube&) { return false; };
+  const auto stop = [](const OccupiedLeaf&) { return false; };
   return visitUnknown(impl_->tree, WHOLE_MAP, keys, stop);
 }
 
@@ -175,11 +154,9 @@ std::vector<OccupiedLeaf> KnownSpace::unknownLeaves(const Box& crop_m, std::size
   }
   KeyBox keys;
   if (!touchedKeys(crop_m, impl_->resolution_m, keys)) return leaves;
-  const auto keep = [&](const Cube& cube) {
+  const auto keep = [&](const OccupiedLeaf& cube) {
     if (leaves.size() == max_leaves) return false;
-    leaves.push_back({{static_cast<std::uint16_t>(cube.min[0]), static_cast<std::uint16_t>(cube.min[1]),
-                       static_cast<std::uint16_t>(cube.min[2])},
-                      static_cast<std::uint32_t>(cube.size)});
+    leaves.push_back(cube);
     return true;
   };
   if (!visitUnknown(impl_->tree, WHOLE_MAP, keys, keep)) {

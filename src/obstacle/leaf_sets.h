@@ -27,6 +27,22 @@ inline VoxelTree::Coverage coverage(const VoxelTree& tree, const OccupiedLeaf& c
   return tree.coverage(cube.min.x, cube.min.y, cube.min.z, static_cast<std::int32_t>(cube.size));
 }
 
+/// Whether some voxel of the cube is in the box, and whether all are.
+inline bool meets(const OccupiedLeaf& cube, const KeyBox& box) {
+  const std::int32_t lo[3] = {cube.min.x, cube.min.y, cube.min.z}, size = static_cast<std::int32_t>(cube.size);
+  for (int a = 0; a < 3; ++a) {
+    if (lo[a] > box.hi[a] || lo[a] + size <= box.lo[a]) return false;
+  }
+  return true;
+}
+inline bool isInside(const OccupiedLeaf& cube, const KeyBox& box) {
+  const std::int32_t lo[3] = {cube.min.x, cube.min.y, cube.min.z}, size = static_cast<std::int32_t>(cube.size);
+  for (int a = 0; a < 3; ++a) {
+    if (lo[a] < box.lo[a] || lo[a] + size - 1 > box.hi[a]) return false;
+  }
+  return true;
+}
+
 /// Calls visit(part) for the parts of a cube that no leaf of the tree covers, as large ones as there are.
 template <class Visit>
 void visitUncovered(const VoxelTree& tree, const OccupiedLeaf& cube, Visit&& visit) {

@@ -1,7 +1,6 @@
 #include "stream/own_voxels.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -30,14 +29,6 @@ VoxelTree treeOf(const std::unordered_map<std::uint64_t, OwnVoxel>& voxels) {
   leaves.reserve(voxels.size());
   for (const auto& one : voxels) leaves.push_back({one.second.key, 1});
   return VoxelTree(leaves);
-}
-
-bool meets(const OccupiedLeaf& cube, const KeyBox& box) {
-  const std::array<std::int32_t, 3> lo{cube.min.x, cube.min.y, cube.min.z};
-  for (int a = 0; a < 3; ++a) {
-    if (lo[a] > box.hi[a] || lo[a] + static_cast<std::int32_t>(cube.size) <= box.lo[a]) return false;
-  }
-  return true;
 }
 
 /// Calls visit(voxel) for the finest voxels of a cube within the box.

@@ -1,6 +1,6 @@
 #include "dccd/safe_until.h"
 
-#include <gmp.h>
+#include <gmpxx.h>
 
 #include <algorithm>
 #include <array>
@@ -22,40 +22,16 @@ constexpr double NONE = SpeedBound::NONE;
 double roundedDown(double value) { return std::nextafter(value, 0.0); }  // of what is 0 or more
 double roundedUp(double value) { return std::nextafter(value, NONE); }
 
-/// A rational number; doubles convert exactly.
-class Rational {
- public:
-  explicit Rational(double value) {
-    mpq_init(q_);
-    mpq_set_d(q_, value);
-  }
-  Rational(const Rational&) = delete;
-  Rational& operator=(const Rational&) = delete;
-  ~Rational() { mpq_clear(q_); }
-  void subtract(const Rational& other) { mpq_sub(q_, q_, other.q_); }
-  void add(const Rational& other) { mpq_add(q_, q_, other.q_); }
-  void multiply(const Rational& other) { mpq_mul(q_, q_, other.q_); }
-  void square() { mpq_mul(q_, q_, q_); }
-  bool isAbove(const Rational& other) const { return mpq_cmp(q_, other.q_) > 0; }
-
- private:
-  mpq_t q_;
-};
-
-/// |to - from| > max_m_s * time, by rational arithmetic.
+/// |to - from| > max_m_s * time, by rational arithmetic, to which doubles convert exactly.
 bool isFasterExactly(const Vec3& from, const Vec3& to, double max_m_s, StampNs time_ns) {
-  Rational way(0), limit(max_m_s), nanosecond(1e9);
+  mpq_class way_sq = 0;  // [m^2]
   for (int axis = 0; axis < 3; ++axis) {
-    Rational along(to[axis]);
-    along.subtract(Rational(from[axis]));
-    along.square();
-    way.add(along);
+    const mpq_class along = mpq_class(to[axis]) - mpq_class(from[axis]);
+    way_sq += along * along;
   }
-  nanosecond.square();
-  way.multiply(nanosecond);                                // [m^2 ns^2 / s^2]
-  limit.multiply(Rational(static_cast<double>(time_ns)));  // below 2^53 ns, 104 days: exact
-  limit.square();
-  return way.isAbove(limit);
+  // [m ns / s]; below 2^53 ns, 104 days: exact.
+  const mpq_class limit = mpq_class(max_m_s) * mpq_class(static_cast<double>(time_ns)), nanoseconds = 1e9;
+  return way_sq * nanoseconds * nanoseconds > limit * limit;
 }
 
 /// The first vertex that is certainly farther from where it was than its bound allows. One that is not finite says

@@ -12,6 +12,7 @@
 #include "oracle/oracle.h"
 #include "support/margin_numbers.h"
 #include "support/margin_pairs.h"
+#include "support/pair_list.h"
 
 namespace dccd {
 namespace test {
@@ -64,7 +65,9 @@ IsWrong judgeBound(const MarginInput& input) {
   if (!(separation >= 0)) return [] { return false; };
   std::optional<Root> toc = separation == 0 ? firstContact(kind, motion) : std::nullopt;
   return [=]() mutable {
-    const double bound = linearTocBound(kind, motion, separation);
+    PairList pair(kind);
+    pair.add(motion);
+    const double bound = linearTocBound(kind, pair.vertices.data(), pair.pairs[0], separation);
     if (separation == 0) {
       return toc && (bound > 1 || toc->compareWith(Dyadic::fromDouble(bound)) < 0);
     }
@@ -84,7 +87,10 @@ MarginInput viewInput(RandomSource& random) {
 
 IsWrong judgeView(const MarginInput& input) {
   return [input] {
-    const ViewPlane plane(V3(input.x[0], input.x[1], input.x[2]));
+    const V3 along = V3(input.x[0], input.x[1], input.x[2]).normalized();
+    ViewPlane plane(V3::UnitX());
+    plane.u = along.unitOrthogonal();  // any plane, more than those that are seen in
+    plane.w = along.cross(plane.u);
     const double* point = input.x.data() + 3;
     const std::array<double, 2> seen = plane.coordinates(point);
     const Rational error = exact(ViewPlane::error(V3(point[0], point[1], point[2]).lpNorm<1>()));

@@ -16,9 +16,6 @@ using Feature = FeatureTree::Feature;
 
 bool isIdentity(const Eigen::Isometry3d& pose) { return pose.matrix() == Eigen::Isometry3d::Identity().matrix(); }
 
-/// Of the whole part. Empty bodies: nothing is in it.
-StepBox boxOf(const SceneBody& body) { return StepBox::still(body.bounds_min, body.bounds_max); }
-
 /// It holds something, and squares of distances stay finite.
 bool isUsable(const StepBox& box) {
   for (const int k : {0, 1, 2, 4, 5, 6}) {
@@ -29,12 +26,7 @@ bool isUsable(const StepBox& box) {
 }
 
 /// Empty where nothing is occupied.
-StepBox boxOf(const VoxelSurface& map) { return StepBox::still(map.bounds().min.data(), map.bounds().max.data()); }
-
-/// What the boxes are apart at least over the whole part [m].
-double apartByBoxes(const StepBox& a, const StepBox& b) {
-  return std::sqrt(squaredGap(a, b, 0)) * (1 - tolerance::CLEARANCE_BOX);
-}
+StepBox boxOfMap(const VoxelSurface& map) { return StepBox::still(map.bounds().min.data(), map.bounds().max.data()); }
 
 /// Exact, at t1: the hulls of 1 to 3 corners.
 bool meetAtEnd(const MovingHull& a, const MovingHull& b) {
@@ -57,89 +49,7 @@ bool meetAtEnd(const MovingHull& a, const LeafBox& box) {
   return triangleMeetsBox(at(0), at(1), at(2), box) != TriangleStart::APART;
 }
 
-/// All contacts of the two are expected.
-bool expectsAll(const std::vector<Expectation>& expected, std::uint16_t a, std::uint16_t b) {
-  return std::any_of(expected.begin(), expected.end(), [&](const Expectation& one) {
-    const ExpectedPartner &x = one.partners[0], &y = one.partners[1];
-    return x.vertices.empty() && y.vertices.empty() && std::minmax(x.body, y.body) == std::minmax(a, b);
-  });
-}
-
 }  // namespace
-
-void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Options& options) {
-  options_ = options.clearance;
-  exact_ = options.accuracy.rung == Accuracy::EXACT;
-  const std::size_t n = step.bodies.size();
-  bodies_.resize(n);
-  rows_.clear();
-  row_of_.assign(n * (n + 1), NOT_ASKED);
-  pairs_ = parts_ = 0;
-  expected_ = options.expected;
-  for (std::size_t b = 0; b < n; ++b) learn(step.bodies[b], scene.bodies()[b], bodies_[b]);
-  const auto ask = [&](std::size_t a, std::size_t b) {
-    row_of_[a * (n + 1) + b] = ROWLESS;
-    ++pairs_;
-  };
-  for (std::size_t a = 0; a < n; ++a) {
-    if (options_.self_m > 0 && meetsItself(step.bodies[a])) ask(a, a);
-    for (std::size_t b = a + 1; b < n; ++b) {
-      if (meet(step.bodies[a], a, step.bodies[b], b)) ask(a, b);
-    }
-    if (meetsMap(step.bodies[a]) && (step.map.surface || options.obstacle_expected)) ask(a, n);
-  }
-  std::vector<bool> lost;
-  for (const Body& body : step.bodies) lost.push_back(body.dropped_faces > 0 || looseVertices(body) > 0);
-  for (std::size_t a = 0; a < n; ++a) {
-    for (std::size_t b = a; b <= n; ++b) {
-      if (row_of_[a * (n + 1) + b] == NOT_ASKED) continue;
-      const bool unknown = lost[a] || (b == n ? !step.map.surface : lost[b]);
-      if (pairs_ <= MOST_ROWS || unknown || a == b || b == n) addRow(a, b).unknown = unknown;
-    }
-  }
-}
-
-std::int32_t& ClearanceFinder::placeOf(std::size_t a, std::size_t b) {
-  const std::size_t n = bodies_.size();
-  if (a > b) std::swap(a, b);
-  return row_of_[a * (n + 1) + std::min(b, n)];
-}
-
-/// Of a pair that was far in all parts that came.
-ClearanceFinder::Row ClearanceFinder::newRow(std::size_t a, std::size_t b) const {
-  Row row;
-  row.answer.body = {static_cast<std::uint16_t>(a),
-                     b == bodies_.size() ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
-  row.answer.expected = expectsAll(expected_, row.answer.body[0], row.answer.body[1]);
-  row.parts = parts_;
-  if (parts_ > 0) row.at_end.lower_m = row.over_step.lower_m = limitOf(row) + radiusOf(row);
-  return row;
-}
-
-ClearanceFinder::Row& ClearanceFinder::addRow(std::size_t a, std::size_t b) {
-  placeOf(a, b) = static_cast<std::int32_t>(rows_.size());
-  rows_.push_back(newRow(a, b));
-  return rows_.back();
-}
-
-/// Of two bodies that boxes do not show to be far, of which nothing is known, or that have a contact.
-void ClearanceFinder::addRowsOfNear(const ClearancePart& part) {
-  std::vector<StepBox> boxes;
-  for (const SceneBody& body : part.scene.bodies()) boxes.push_back(boxOf(body));
-  for (std::size_t a = 0; a < boxes.size(); ++a) {
-    for (std::size_t b = a + 1; b < boxes.size(); ++b) {
-      if (placeOf(a, b) != ROWLESS) continue;
-      const double limit_m = options_.max_m + bodies_[a].radius_m + bodies_[b].radius_m;
-      const bool known = bodies_[a].known && bodies_[b].known;
-      if (!known || !(apartByBoxes(boxes[a], boxes[b]) >= limit_m)) addRow(a, b);
-    }
-  }
-  const auto addRowOf = [&](const std::array<std::uint16_t, 2>& body) {
-    if (placeOf(body[0], body[1]) == ROWLESS) addRow(body[0], body[1]);
-  };
-  for (const StartIntersection& s : part.found.intersections) addRowOf(s.body);
-  for (const Contact& c : part.found.contacts) addRowOf(c.body);
-}
 
 /// What is made once for many steps.
 void ClearanceFinder::learn(const Body& body, const SceneBody& scene_body, BodyState& state) const {
@@ -154,22 +64,6 @@ void ClearanceFinder::learn(const Body& body, const SceneBody& scene_body, BodyS
                        state.tree);
   state.self_m = options_.self_m;
   state.far_at.clear();
-}
-
-ClearanceFinder::Row* ClearanceFinder::rowOf(std::size_t a, std::size_t b) {
-  const std::int32_t row = placeOf(a, b);
-  return row < 0 ? nullptr : &rows_[static_cast<std::size_t>(row)];
-}
-
-double ClearanceFinder::limitOf(const Row& row) const {
-  const bool itself = row.answer.body[0] == row.answer.body[1];
-  return itself ? std::min(options_.max_m, tolerance::CLEARANCE_SELF * options_.self_m) : options_.max_m;
-}
-
-/// How much nearer the two may be than where they were seen.
-double ClearanceFinder::radiusOf(const Row& row) const {
-  const auto [a, b] = row.answer.body;
-  return bodies_[a].radius_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].radius_m);
 }
 
 void ClearanceFinder::learnBodies(const ClearancePart& part) {
@@ -299,7 +193,7 @@ void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<st
 bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& part, double limit_m) {
   const auto [a, b] = row.answer.body;
   const bool on_map = b == OBSTACLE_BODY, empty = on_map && part.map && part.map->leafCount() == 0;
-  const bool known = on_map ? part.map && (empty || isUsable(boxOf(*part.map))) : bodies_[b].known;
+  const bool known = on_map ? part.map && (empty || isUsable(boxOfMap(*part.map))) : bodies_[b].known;
   row.unknown = row.unknown || !bodies_[a].known || !known;
   if (row.unknown) return true;
   ++row.parts;
@@ -311,7 +205,7 @@ bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& part, double 
     apart.lower_m = isStillFar(a, part, limit_m) ? limit_m : 0;
   } else if (!on_map || isIdentity(part.step.map.map_from_fixed)) {
     apart.lower_m =
-        apartByBoxes(boxOf(part.scene.bodies()[a]), on_map ? boxOf(*part.map) : boxOf(part.scene.bodies()[b]));
+        apartByBoxes(boxOf(part.scene.bodies()[a]), on_map ? boxOfMap(*part.map) : boxOf(part.scene.bodies()[b]));
   }
   const bool is_far = apart.lower_m >= limit_m;
   if (!is_far && !part.deadline.isOver()) return false;
@@ -427,74 +321,6 @@ void ClearanceFinder::describe(const Row& row, const ClearancePart& part, const 
   const Eigen::Isometry3d& pose = part.step.map.map_from_fixed;
   if (isIdentity(pose)) return;
   for (Vec3& point : distance.point) point = pose.inverse() * point;
-}
-
-void ClearanceFinder::judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const {
-  const double limit_m = limitOf(row), radius_m = radiusOf(row);
-  if (found.lower_m >= limit_m + radius_m) {
-    distance = ClearanceDistance();
-    distance.status = ClearanceStatus::FARTHER;
-    distance.lower_m = limit_m;
-    return;
-  }
-  const double wide_m = std::max(options_.tolerance_m, tolerance::CLEARANCE_RELATIVE * found.upper_m);
-  distance.status = found.upper_m == 0                                        ? ClearanceStatus::TOUCHING
-                    : found.cut || !(found.upper_m - found.lower_m <= wide_m) ? ClearanceStatus::LOWER
-                                                                              : ClearanceStatus::MEASURED;
-  distance.lower_m = std::max(0.0, found.lower_m - radius_m);
-  if (radius_m > 0) distance.lower_m *= 1 - tolerance::CLEARANCE_BOX;  // for the sum of radii, and the difference
-  distance.upper_m = found.upper_m;
-}
-
-void ClearanceFinder::conclude(Row& row, std::size_t parts) const {
-  Clearance& answer = row.answer;
-  if (row.parts < parts) {  // what was not come to may be anything
-    row.over_step.lower_m = row.at_end.lower_m = 0;
-    row.over_step.cut = row.at_end.cut = true;
-  }
-  if (!row.unknown) judge(row, row.at_end, answer.at_end);
-  if (row.touches) {
-    const double upper_m = exact_ || row.unknown ? 0 : row.over_step.upper_m;
-    answer.over_step.status = ClearanceStatus::TOUCHING;
-    answer.over_step.lower_m = 0;
-    answer.over_step.upper_m = upper_m;
-  } else if (row.unknown || row.undecided) {
-    answer.over_step = ClearanceDistance();
-  } else if (answer.at_end.status == ClearanceStatus::TOUCHING) {
-    answer.over_step = answer.at_end;
-  } else {
-    judge(row, row.over_step, answer.over_step);
-  }
-}
-
-void ClearanceFinder::finish(std::size_t parts, Outcome& outcome) {
-  StageStats& stats = outcome.stats[Effect::CLEARANCE];
-  stats.in = pairs_;
-  stats.out = 0;
-  outcome.clearances.clear();
-  const std::size_t n = bodies_.size();
-  bool one_is_far = false;  // and has its row
-  for (std::size_t a = 0; a < n; ++a) {
-    for (std::size_t b = a; b <= n; ++b) {
-      const std::int32_t place = row_of_[a * (n + 1) + b];
-      if (place == NOT_ASKED) continue;
-      // Of half a million pairs nothing is made for most. One that is far shows that no part is missing.
-      const std::uint16_t partner = b == n ? OBSTACLE_BODY : static_cast<std::uint16_t>(b);
-      if (place == ROWLESS && one_is_far && !expectsAll(expected_, static_cast<std::uint16_t>(a), partner)) {
-        ++stats.out;
-        continue;
-      }
-      Row none;
-      if (place == ROWLESS) none = newRow(a, b);
-      Row& row = place == ROWLESS ? none : rows_[static_cast<std::size_t>(place)];
-      conclude(row, parts);
-      const ClearanceStatus status = row.answer.over_step.status;
-      stats.out += status != ClearanceStatus::LOWER && status != ClearanceStatus::UNKNOWN;
-      const bool stands_for_others = status == ClearanceStatus::FARTHER && a != b && !row.answer.expected;
-      if (pairs_ > MOST_ROWS && stands_for_others && std::exchange(one_is_far, true)) continue;
-      outcome.clearances.push_back(row.answer);
-    }
-  }
 }
 
 }  // namespace dccd

@@ -69,12 +69,22 @@ class DCCD_HIDDEN ClearanceFinder {
   /// In row_of_, beside the numbers of rows.
   enum : std::int32_t { NOT_ASKED = -1, ROWLESS = -2 };
 
-  void learn(const Body& body, const SceneBody& scene_body, BodyState& state) const;
+  /// Of the whole part. Empty bodies: nothing is in it.
+  static StepBox boxOf(const SceneBody& body) { return StepBox::still(body.bounds_min, body.bounds_max); }
+
+  // clearance_rows.cpp
   std::int32_t& placeOf(std::size_t a, std::size_t b);
   Row* rowOf(std::size_t a, std::size_t b);
   Row newRow(std::size_t a, std::size_t b) const;
   Row& addRow(std::size_t a, std::size_t b);
   void addRowsOfNear(const ClearancePart& part);
+  double limitOf(const Row& row) const;
+  double radiusOf(const Row& row) const;
+  void conclude(Row& row, std::size_t parts) const;
+  void judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const;
+
+  // clearance_finder.cpp
+  void learn(const Body& body, const SceneBody& scene_body, BodyState& state) const;
   void takeContacts(const ClearancePart& part);
   void touchAt(const ClearancePart& part, double t, std::array<std::uint16_t, 2> body,
                std::array<FeatureTree::Feature, 2> vertex, const OccupiedLeaf* leaf);
@@ -88,10 +98,6 @@ class DCCD_HIDDEN ClearanceFinder {
                         const FoundDistance& known);
   void describe(const Row& row, const ClearancePart& part, const FoundDistance& found,
                 ClearanceDistance& distance) const;
-  void conclude(Row& row, std::size_t parts) const;
-  void judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const;
-  double limitOf(const Row& row) const;
-  double radiusOf(const Row& row) const;
 
   ClearanceOptions options_;
   bool exact_ = true;  // a contact is a touch, not a distance

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "dccd/elementary.h"
@@ -62,6 +63,11 @@ inline double squaredGap(const StepBox& a, const StepBox& b, int first) {
     sum += gap * gap;
   }
   return sum * (1 - tolerance::CLEARANCE_BOX);
+}
+
+/// What they are apart at least over the whole step [m].
+inline double apartByBoxes(const StepBox& a, const StepBox& b) {
+  return std::sqrt(squaredGap(a, b, 0)) * (1 - tolerance::CLEARANCE_BOX);
 }
 
 }  // namespace dccd

@@ -126,20 +126,6 @@ TEST(VoxelTrace, SaysWhyThereIsNone) {
   EXPECT_EQ(atTheRung(lines).front(), TraceLine::Says::REJECTED);
 }
 
-TEST(VoxelTrace, WhatDoesNotExistIsNamed) {
-  const StepRecording r = recordScene();
-  const auto ask = [&](const ObstacleMap& map, const PairQuestion& q) {
-    Step step = r.step;
-    step.map = map;
-    return explain(step, r.options, q);
-  };
-  EXPECT_THROW(ask(r.step.map, {PairKind::VERTEX_VOXEL_FACE, {9, 0}, {0}, {}}), std::invalid_argument);
-  EXPECT_THROW(ask(r.step.map, {PairKind::VERTEX_VOXEL_FACE, {0, 0}, {300}, {}}), std::invalid_argument);
-  EXPECT_THROW(ask(r.step.map, {PairKind::EDGE_VOXEL_EDGE, {0, 0}, {0, 19}, {}}), std::invalid_argument)
-      << "no such edge";
-  EXPECT_THROW(ask(ObstacleMap(), {PairKind::VERTEX_VOXEL_FACE, {0, 0}, {0}, {}}), std::invalid_argument) << "no map";
-}
-
 // A listed pair is left out only while it is closer in the reference frame than its present separation; its radii may
 // be smaller now than those of the list.
 TEST(PairTrace, HoldsAListedPairToItsPresentSeparation) {
@@ -179,15 +165,17 @@ TEST(PairTrace, HoldsAListedPairToItsPresentSeparation) {
   }
 }
 
-TEST(PairTrace, WhatDoesNotExistIsNamed) {
-  const StepRecording r = recordScene();
-  EXPECT_THROW(explain(r.step, r.options, PairQuestion{PairKind::VERTEX_FACE, {9, 0}, {0, 1, 2, 3}}),
-               std::invalid_argument);
-  EXPECT_THROW(explain(r.step, r.options, PairQuestion{PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 300}}),
-               std::invalid_argument);
-  EXPECT_THROW(explain(r.step, r.options, PairQuestion{PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 19}}),
-               std::invalid_argument)
-      << "no such face";
+TEST(PairTrace, WhatDoesNotExistIsRefused) {
+  StepRecording r = recordScene();
+  const auto refuses = [&](const PairQuestion& q) {
+    EXPECT_THROW(explain(r.step, r.options, q), std::invalid_argument);
+  };
+  refuses({PairKind::VERTEX_FACE, {9, 0}, {0, 1, 2, 3}, {}});
+  refuses({PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 300}, {}});
+  refuses({PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 19}, {}});  // no such face
+  refuses({PairKind::EDGE_VOXEL_EDGE, {0, 0}, {0, 19}, {}});
+  r.step.map = ObstacleMap();
+  refuses({PairKind::VERTEX_VOXEL_FACE, {0, 0}, {0}, {}});
 }
 
 }  // namespace

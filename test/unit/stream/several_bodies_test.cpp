@@ -219,22 +219,8 @@ TEST_F(TwoBodies, TimeJumpDropsWhatWaits) {
   expectAddsUp(monitor);
 }
 
-TEST(StaticBody, HoldsAtAllTimes) {
-  Body table = named("table");
-  table.motion = BodyMotionKind::STATIC;
-  Monitor monitor(loose(), {named("tip"), table});
-  Outcome outcome;
-  monitor.push(0, tip(0, 1), NOW);
-  monitor.push(1, floor(5, 0), NOW);
-  monitor.push(0, tip(100 * MS, -1), NOW);
-  ASSERT_TRUE(monitor.next(NOW, outcome));
-  ASSERT_TRUE(monitor.next(NOW, outcome));
-  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
-  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
-}
-
-// A static body's frame that cannot be used leaves the one before in its place.
-TEST(StaticBody, KeepsItsPlaceWhenAFrameIsRefused) {
+// At all times; a frame that cannot be used leaves the one before in its place.
+TEST(StaticBody, HoldsAlsoWhenAFrameIsRefused) {
   Body table = named("table");
   table.motion = BodyMotionKind::STATIC;
   Monitor monitor(loose(), {named("tip"), table});
