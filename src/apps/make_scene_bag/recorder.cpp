@@ -260,6 +260,7 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
   if (!options.monitor_config_path.empty()) {
     std::ofstream config(options.monitor_config_path);
     config << "# Parameters of the monitor for the scene " << spec.name << "\n" << spec.monitor_yaml << "\n";
+    config.close();
     if (!config) throw std::runtime_error(options.monitor_config_path + ": cannot be written");
   }
   return summary(spec, simulation, bag_path);
