@@ -198,6 +198,7 @@ int analyze(const Arguments& a) {
       [&](const Outcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
+  if (out) out->close();
   describe(a, config, summary, report);
   report.finish();
   std::string study_line;
