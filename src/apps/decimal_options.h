@@ -1,5 +1,5 @@
-// What the command lines of the tools have in common: numbers, what is said of an unknown option, and that no tool writes
-// over what it reads.
+// What the command lines of the tools have in common: numbers, what is said of an unknown option, and that no tool
+// writes over what it reads.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -43,7 +43,7 @@ class OutputBag {
     try {
       bag_->close();
     } catch (const rosbag::BagException& error) {
-      static rosbag::Bag* volatile given_up;  // never destroyed
+      [[maybe_unused]] static rosbag::Bag* volatile given_up;  // never destroyed
       given_up = bag_.release();
       throw std::runtime_error(path_ + ": cannot be written: " + error.what());
     }
