@@ -204,7 +204,7 @@ const char* const HISTORY_DOC = R"(What lasts from one step to the next, for ste
 History()
 
 Give the same one to each detect() of a sequence of steps: what was made of the meshes is made once, and where a step
-begins exactly where the last one ended, what is known of that end is not looked for again. No answer changes.
+begins exactly where the last one ended, what is known of that end is not looked for again. No answer changes, but for what detect() says.
 Threads may share one; they then take turns.)";
 
 }  // namespace

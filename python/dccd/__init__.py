@@ -77,7 +77,8 @@ def detect(bodies: Body | Sequence[Body], *, voxels: Voxels | None = None, histo
     voxels : Voxels
         The map, at rest during the step.
     history : History
-        For a sequence of steps: the same one each time saves time and changes no answer.
+        For a sequence of steps: the same one each time saves time and changes no answer, but for which contacts
+        max_found keeps and which crossing earliest_only lists.
     accuracy : str
         'exact' (the default): no contact is missed, none invented. 'conservative': for distances (minimum_separation_m,
         radius_m).

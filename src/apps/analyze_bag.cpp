@@ -176,6 +176,7 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
 }
 
 int analyze(const Arguments& a) {
+  for (const std::string& input : {a.bag, a.params, a.octomap, a.robot}) refuseToOverwrite(input, {a.out});
   const MonitorConfig config = configure(a);
   setSimdTarget(config.simd_target);
   BagReplayOptions options;
@@ -197,6 +198,7 @@ int analyze(const Arguments& a) {
       [&](const Outcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
+  if (out) out->close();
   describe(a, config, summary, report);
   report.finish();
   std::string study_line;
@@ -228,9 +230,9 @@ int main(int argc, char** argv) {
   app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")
       ->excludes(octomap);
   app.add_option("--accuracy", a.accuracy, "exact, or conservative for distances");
-  app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
+  app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::Range(1, 256));
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.0, 3600.0));
   app.add_flag("--accuracy-study", a.study,
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
                "does to first contacts");

@@ -47,7 +47,7 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
   app.add_option("--repeat", a.repeat, "run the step this often for the times")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
   app.add_flag("--no-start-state", a.no_start_state, "leave out whether surfaces cross at t=0: then nothing is proved");
@@ -73,6 +73,7 @@ void writeContacts(const std::string& path, const std::vector<std::vector<Contac
           << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';
     }
   }
+  out.close();
   if (!out) throw std::runtime_error(path + ": cannot be written");
 }
 
@@ -229,6 +230,7 @@ std::vector<Step> stepsOf(const Arguments& a) {
 }
 
 int checkStep(const Arguments& a) {
+  for (const std::string& frame : a.frames) refuseToOverwrite(frame, {a.contacts, a.stats});
   setSimdTarget(a.simd);
   const std::vector<Step> steps = stepsOf(a);
   Run run;
@@ -243,6 +245,7 @@ int checkStep(const Arguments& a) {
   if (!a.stats.empty()) {
     std::ofstream out(a.stats);
     out << statsJson(a, run).dump(2) << '\n';
+    out.close();
     if (!out) throw std::runtime_error(a.stats + ": cannot be written");
   }
   return run.assurance.proved ? 0 : NOT_PROVED;

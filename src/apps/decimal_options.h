@@ -1,9 +1,13 @@
-// What the command lines of the tools have in common: numbers, and what is said of an unknown option.
+// What the command lines of the tools have in common: numbers, what is said of an unknown option, and that no tool
+// writes over what it reads.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <filesystem>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "config/nearest_name.h"
@@ -42,6 +46,15 @@ inline void requireDecimalNumbers(CLI::App& app) {
                    : "'" + word + "' is no decimal integer, written without zeros before it";
       });
     }
+  }
+}
+
+/// Throws std::runtime_error where an output is the input, by whatever name: the input would be gone.
+inline void refuseToOverwrite(const std::string& input, const std::vector<std::string>& outputs) {
+  for (const std::string& output : outputs) {
+    std::error_code none;  // what is not there yet is no other file
+    if (!std::filesystem::equivalent(input, output, none)) continue;
+    throw std::runtime_error(output + ": is the input " + input + ", which would be lost; write to another file");
   }
 }
 

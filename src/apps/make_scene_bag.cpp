@@ -55,6 +55,7 @@ int main(int argc, char** argv) {
   dccd::requireDecimalNumbers(app);
   try {
     app.parse(argc, argv);
+    dccd::refuseToOverwrite(scene_path, {bag_path, options.monitor_config_path});
     if (bag_path.size() > 3 && bag_path.compare(bag_path.size() - 3, 3, ".bt") == 0) {
       std::cout << dccd::recordMap(dccd::scene::readObstacleFile(scene_path), bag_path);
       return 0;

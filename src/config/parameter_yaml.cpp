@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <vector>
 
 #include "config/parameter_tree.h"
 #include "dccd/decimal.h"
@@ -26,8 +27,7 @@ class YamlTree {
 
   ParameterTree value(const YAML::Node& node, int depth = 0) {
     if (depth > MAX_DEPTH || ++values_ > MAX_VALUES) {
-      throw ParameterError(name_ + ":" + std::to_string(node.Mark().line + 1) +
-                           ": nests too deeply or repeats itself; write it without anchors");
+      fail(node, "nests too deeply or repeats itself; write it without anchors");
     }
     ParameterTree tree = node.IsScalar() ? scalar(node) : ParameterTree();
     tree.line = node.Mark().line + 1;
@@ -36,12 +36,22 @@ class YamlTree {
       for (const YAML::Node& item : node) tree.items.push_back(value(item, depth + 1));
     } else if (node.IsMap()) {
       tree.kind = Kind::SECTION;
-      for (const auto& member : node) tree.members[member.first.as<std::string>()] = value(member.second, depth + 1);
+      for (const auto& member : node) {
+        const auto name = member.first.as<std::string>();
+        // The server has no such value. Of two, rosparam takes the last one without a word.
+        if (member.second.IsNull()) fail(member.first, name + " has no value; write one, or remove the line");
+        const bool is_new = tree.members.emplace(name, value(member.second, depth + 1)).second;
+        if (!is_new) fail(member.first, name + " stands twice");
+      }
     }
     return tree;
   }
 
  private:
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& what) const {
+    throw ParameterError(name_ + ":" + std::to_string(node.Mark().line + 1) + ": " + what);
+  }
+
   static ParameterTree scalar(const YAML::Node& node) {
     const std::string text = node.Scalar();
     if (node.Tag() == "!") return text;  // quoted
@@ -69,7 +79,9 @@ class YamlTree {
 
 ParameterTree parseYaml(const std::string& text, const std::string& name) {
   try {
-    const YAML::Node root = YAML::Load(text);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1) throw ParameterError(name + ": holds several documents; write one, without a line ---");
+    const YAML::Node root = documents.empty() ? YAML::Node() : documents[0];
     if (root.IsDefined() && !root.IsNull() && !root.IsMap()) {
       throw ParameterError(name + ":" + std::to_string(root.Mark().line + 1) +
                            ": parameters must be a map of names: write `name: value` lines");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 #include <vector>
 
@@ -41,10 +42,20 @@ void openBag(const std::string& path, rosbag::Bag& bag) {
 }
 
 TransformWindow::TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
-    : feed_(feed), view_(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"})), next_(view_.begin()) {
-  rosbag::View statics(bag, rosbag::TopicQuery("/tf_static"));
-  for (const rosbag::MessageInstance& m : statics) {
-    if (const auto tf = m.instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);
+    : feed_(feed),
+      view_(bag, rosbag::TopicQuery("/tf")),
+      statics_(bag, rosbag::TopicQuery("/tf_static")),
+      next_(view_.begin()),
+      next_static_(statics_.begin()) {
+  std::set<std::string> known;
+  for (const rosbag::MessageInstance& m : statics_) {
+    const auto tf = m.instantiate<tf2_msgs::TFMessage>();
+    if (!tf) continue;
+    tf2_msgs::TFMessage firsts;
+    for (const auto& transform : tf->transforms) {
+      if (known.insert(transform.child_frame_id).second) firsts.transforms.push_back(transform);
+    }
+    feed_.add(firsts, true);
   }
 }
 
@@ -63,14 +74,16 @@ void TransformWindow::meshComes(std::size_t body, StampNs stamp_ns, const ros::T
 }
 
 void TransformWindow::feedUntil(const ros::Time& at) {
+  for (; next_static_ != statics_.end() && next_static_->getTime() <= at; ++next_static_) {
+    if (const auto tf = next_static_->instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);
+  }
   for (; next_ != view_.end() && next_->getTime() <= at + TF_AHEAD; ++next_) {
-    const bool is_static = next_->getTopic() == "/tf_static";
     if (!waiting_) waiting_ = next_->instantiate<tf2_msgs::TFMessage>();
     // Where the meshes never go back, its turn comes all the same.
     const ros::Time recorded = next_->getTime();
     const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);
-    if (waiting_ && feed_.clears(*waiting_, is_static) && !due) return;
-    if (waiting_) feed_.add(*waiting_, is_static);
+    if (waiting_ && feed_.clears(*waiting_, false) && !due) return;
+    if (waiting_) feed_.add(*waiting_, false);
     waiting_.reset();
   }
 }

@@ -19,7 +19,7 @@ void openBag(const std::string& path, rosbag::Bag& bag);
 /// meshes have gone back, too.
 class TransformWindow {
  public:
-  /// Static transforms are fed at once.
+  /// The first static transform of each frame is fed at once. One that comes in its place holds from then on.
   TransformWindow(const rosbag::Bag& bag, TransformFeed& feed);
   /// What a buffer must hold: ahead of the meshes, and behind them.
   static ros::Duration length();
@@ -29,8 +29,8 @@ class TransformWindow {
 
  private:
   TransformFeed& feed_;
-  rosbag::View view_;
-  rosbag::View::iterator next_;
+  rosbag::View view_, statics_;
+  rosbag::View::iterator next_, next_static_;
   tf2_msgs::TFMessage::ConstPtr waiting_;  // the message at next_, where it was read already
   std::map<std::size_t, StampNs> newest_mesh_;
   std::optional<ros::Time> meshes_went_back_;

@@ -17,12 +17,15 @@ struct StepReplay {
 };
 
 /// Computes the step with the recorded options, but without a deadline and on `threads` workers: neither may change an
-/// answer. A step that ran out of its budget was answered in part: then what it reported as certain must be there
-/// again. Throws std::invalid_argument when the options or bodies of the recording are not possible.
+/// answer. A step that ran out of its budget, or was cut at what a step may find, was answered in part: then what it
+/// reported as certain must be there again, as far as no such limit cuts the replay. Throws std::invalid_argument when
+/// the options or bodies of the recording are not possible.
 DCCD_EXPORT StepReplay replayStep(const StepRecording& recording, int threads = 1);
 
-/// Bits that differ between two answers, one sentence each, ten at most.
-DCCD_EXPORT std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed);
+/// Bits that differ between two answers to the same step, one sentence each, ten at most. With earliest_only each may
+/// list another crossing.
+DCCD_EXPORT std::vector<std::string> compareAnswers(const Options& options, const Outcome& recorded,
+                                                    const Outcome& replayed);
 
 /// "VF cloth 3 | table 0 1 2", with the voxel where there is one.
 DCCD_EXPORT std::string describeContact(const Contact& contact, const std::vector<Body>& bodies);

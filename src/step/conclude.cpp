@@ -187,10 +187,15 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
   return excluded;
 }
 
+/// With earliest_only, beside a contact: nobody looked whether more begin after it.
+bool hidesLaterOnes(const Options& options, const Outcome& outcome) {
+  return options.earliest_only && outcome.total_contacts + outcome.suppressed > 0;
+}
+
 /// INTERSECTING needs no case of its own: what crosses is a listed intersection or an initial contact with the map.
-Touching touchingOf(const Outcome& outcome, std::size_t suppressed_unexpected) {
+Touching touchingOf(const Options& options, const Outcome& outcome, std::size_t suppressed_unexpected) {
   const ContactCounts& counts = outcome.counts;
-  if (counts.unexpectedNew() > 0) return Touching::NEW;
+  if (counts.unexpectedNew() > 0 || hidesLaterOnes(options, outcome)) return Touching::NEW;
   const bool crosses = std::any_of(outcome.intersections.begin(), outcome.intersections.end(),
                                    [](const StartIntersection& one) { return !one.expected; });
   if (counts.unexpectedInitial() > 0 || suppressed_unexpected > 0 || crosses) return Touching::LASTING;
@@ -283,8 +288,11 @@ void conclude(const Options& options, const Step& step, std::size_t needed_parts
   outcome.stats[Effect::OWN_VOXELS].in = step.map.own.looked_at;
   outcome.stats[Effect::OWN_VOXELS].out = step.map.own.own + step.map.own.doubted;
   outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);
+  if (hidesLaterOnes(options, outcome)) {
+    outcome.excluded.emplace_back("contacts that begin after the first one by earliest_only");
+  }
   outcome.expected = describe(options.expected, step.bodies);
-  outcome.touching = touchingOf(outcome, suppressed_unexpected);
+  outcome.touching = touchingOf(options, outcome, suppressed_unexpected);
   outcome.answered = true;
 }
 

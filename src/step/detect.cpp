@@ -151,6 +151,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
       runPart(part, i, parts, i > 0 || continues, deadline, outcome);
     }
     joinParts(outcome.contacts);
+    if (prepared.options->earliest_only) keepFirst(false, outcome.contacts);
   }
   // Where a step was cut, nobody looked at its end.
   if (reached_end) {

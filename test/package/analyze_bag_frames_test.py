@@ -55,6 +55,20 @@ class AnalyzeBagFramesTest(AnalyzeBagTestCase):
                         write_moving(bag, cloth[i % len(cloth)], stamp, at, at - genpy.Duration.from_sec(early_s))
                 self.assertEqual(self.statuses(looped), {'FIRST_FRAME': 1, 'OK': 2 * len(cloth) - 2, 'TIME_JUMP': 1})
 
+    def test_a_static_transform_that_changes(self):
+        """The first one holds before it was recorded, the second one from then on: the cloth is elsewhere, once."""
+        changed, cloths = self.folder / 'changed.bag', [m for m in self.messages if m[0] == '/cloth']
+        with rosbag.Bag(str(changed), 'w') as bag:
+            for k, (topic, message, at) in enumerate(cloths):
+                message = copy.deepcopy(message)
+                message.header.frame_id = 'camera'
+                bag.write(topic, message, at)
+                if k in (1, len(cloths) // 2):
+                    static = TransformStamped(child_frame_id='camera')
+                    static.header.frame_id, static.transform.rotation.w, static.transform.translation.x = 'world', 1, 5.0 * k
+                    bag.write('/tf_static', TFMessage([static]), at)
+        self.assertEqual(self.statuses(changed), {'FIRST_FRAME': 1, 'OK': len(cloths) - 2, 'TELEPORT': 1})
+
     def test_a_static_body_that_was_recorded_before_the_first_frame(self):
         """Without fixed_frame it has no place before the cloth's first message, and it is sent only once."""
         cloths = [(topic, message, at) for topic, message, at in self.messages if topic == '/cloth']

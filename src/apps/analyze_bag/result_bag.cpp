@@ -16,11 +16,7 @@
 namespace dccd {
 
 ResultBag::ResultBag(const std::string& path, const MonitorConfig& config)
-    : bag_(path, rosbag::bagmode::Write),
-      look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
-      diagnostics_(MONITOR_NAMESPACE) {
-  bag_.setCompression(rosbag::CompressionType::LZ4);
-}
+    : bag_(path), look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES), diagnostics_(MONITOR_NAMESPACE) {}
 
 template <class Message>
 void ResultBag::write(const char* name, const ros::Time& at, const Message& message) {

@@ -4,8 +4,7 @@
 
 #include <string>
 
-#include <rosbag/bag.h>
-
+#include "apps/output_bag.h"
 #include "dccd/look_ahead_score.h"
 #include "node/bag_replay.h"
 #include "output/diagnostics.h"
@@ -14,12 +13,13 @@ namespace dccd {
 
 class ResultBag {
  public:
-  /// Throws rosbag::BagException when the file cannot be written; so do the others.
+  /// Throws rosbag::BagException when the file cannot be opened; the others as OutputBag.
   ResultBag(const std::string& path, const MonitorConfig& config);
   /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
   void copy(const rosbag::MessageInstance& m, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at);
   void addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at);
+  void close() { bag_.close(); }
 
  private:
   template <class Message>
@@ -31,7 +31,7 @@ class ResultBag {
   void addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
   void addPromise(const Outcome& outcome, const MonitorPipeline& pipeline, bool proved, const ros::Time& at);
 
-  rosbag::Bag bag_;
+  OutputBag bag_;
   LookAheadScore look_ahead_;
   std::uint64_t markers_built_ = 0;
   Diagnostics diagnostics_;

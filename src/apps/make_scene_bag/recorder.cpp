@@ -9,7 +9,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include <rosbag/bag.h>
 #include <sensor_msgs/JointState.h>
 #include <boost/make_shared.hpp>
 
@@ -17,6 +16,7 @@
 #include "apps/make_scene_bag/physics/depth_camera.h"
 #include "apps/make_scene_bag/physics/shapes.h"
 #include "apps/make_scene_bag/physics/simulation.h"
+#include "apps/output_bag.h"
 #include "dccd/cloud_map.h"
 #include "report/progress_bar.h"
 
@@ -30,10 +30,7 @@ constexpr double START_STAMP_S = 1000.0;
 /// Writes messages to a bag; latched topics carry the header that makes rosbag play latch them.
 class SceneBag {
  public:
-  explicit SceneBag(const std::string& path) {
-    bag_.open(path, rosbag::bagmode::Write);
-    bag_.setCompression(rosbag::compression::LZ4);
-  }
+  explicit SceneBag(const std::string& path) : bag_(path) {}
   template <class Message>
   void write(const std::string& topic, const ros::Time& stamp, const Message& message, bool latched = false) {
     if (!latched) {
@@ -52,7 +49,7 @@ class SceneBag {
   void close() { bag_.close(); }
 
  private:
-  rosbag::Bag bag_;
+  OutputBag bag_;
 };
 
 std_msgs::Header header(const std::string& frame, const ros::Time& stamp, std::uint32_t seq) {
@@ -260,6 +257,7 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
   if (!options.monitor_config_path.empty()) {
     std::ofstream config(options.monitor_config_path);
     config << "# Parameters of the monitor for the scene " << spec.name << "\n" << spec.monitor_yaml << "\n";
+    config.close();
     if (!config) throw std::runtime_error(options.monitor_config_path + ": cannot be written");
   }
   return summary(spec, simulation, bag_path);

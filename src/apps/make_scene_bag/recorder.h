@@ -19,7 +19,8 @@ struct RecorderOptions {
 };
 
 /// Records the scene; returns a few lines that say what was recorded. Stamps start at START_STAMP_S, whatever the day.
-/// Throws rosbag::BagException when the bag cannot be written, std::runtime_error on a scene that cannot be published.
+/// Throws rosbag::BagException when the bag cannot be opened, std::runtime_error when it cannot be written, and on a
+/// scene that cannot be published.
 std::string recordScene(const scene::SceneSpec& spec, const std::string& bag_path, const RecorderOptions& options);
 
 /// Writes the obstacle as a map file (.bt), for `octomap_file`; returns a line that says what was written. Throws

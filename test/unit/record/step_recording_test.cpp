@@ -33,7 +33,7 @@ TEST(StepRecording, WhatIsReadIsWhatWasWritten) {
   EXPECT_EQ(again.step.bodies[2].topology->edges().size(), 3u);
   ASSERT_TRUE(again.step.map.surface);
   EXPECT_EQ(again.step.map.surface->leafCount(), 2u);
-  EXPECT_TRUE(compareAnswers(r.answer, again.answer).empty());
+  EXPECT_TRUE(compareAnswers(r.options, r.answer, again.answer).empty());
 }
 
 TEST(Recording, SeveralRopesInOneBodyStaySeveral) {

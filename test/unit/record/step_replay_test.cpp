@@ -9,6 +9,7 @@
 #include "dccd/simd_target.h"
 #include "record/step_replay.h"
 #include "support/recordings.h"
+#include "support/step_support.h"
 #include "unit/record/recording_support.h"
 
 namespace dccd {
@@ -105,6 +106,46 @@ TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
   EXPECT_TRUE(replay.differences.empty()) << "the rest was left out, which is no contradiction";
   r.answer.contacts[0].vertex[0] += 1;
   EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+/// The second of two steps, whose clusters were made of where the sheet was in the first.
+StepRecording recordAfterAnother(const Options& options) {
+  StepRecording r;
+  r.step = crumpled(1, 1, 16).motion();
+  std::swap(r.step.bodies[0].t0, r.step.bodies[0].t1);  // so that it crosses itself when it begins
+  r.options = options;
+  Step before = r.step;
+  before.bodies[0].t0 = share(Positions(r.step.bodies[0].t0->rbegin(), r.step.bodies[0].t0->rend()));
+  History history;
+  detect(before, options, history);
+  r.answer = detect(r.step, options, history);
+  r.has_answer = true;
+  return r;
+}
+
+TEST(StepReplay, WhatALimitLeavesDependsOnTheStepsBeforeAndIsNoDifference) {
+  Options options;
+  options.max_found = 20;
+  StepRecording r = recordAfterAnother(options);
+  ASSERT_TRUE(r.answer.cut);
+  const StepReplay replay = replayStep(r);
+  EXPECT_NE(difference(r.answer.contacts, replay.answer.contacts), "") << "else it shows nothing";
+  EXPECT_TRUE(replay.differences.empty()) << replay.differences.front();
+  r.answer.contacts = replay.answer.contacts;
+  r.answer.contacts[0].toc_lower = std::nextafter(r.answer.contacts[0].toc_lower, 2);
+  EXPECT_EQ(replayStep(r).differences.size(), 1u);
+}
+
+TEST(StepReplay, WhichCrossingIsListedAloneDependsOnTheStepsBeforeAndIsNoDifference) {
+  Options options;
+  options.earliest_only = true;
+  StepRecording r = recordAfterAnother(options);
+  ASSERT_EQ(r.answer.intersections.size(), 1u);
+  const StepReplay replay = replayStep(r);
+  EXPECT_FALSE(r.answer.intersections[0] == replay.answer.intersections.at(0)) << "else it shows nothing";
+  EXPECT_TRUE(replay.differences.empty()) << replay.differences.front();
+  r.answer.intersections.clear();
+  EXPECT_EQ(replayStep(r).differences.size(), 1u) << "whether any crosses is no matter of luck";
 }
 
 TEST(StepReplay, AStepWithoutAnAnswerIsComputed) {

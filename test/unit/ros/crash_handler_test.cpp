@@ -57,7 +57,7 @@ TEST_F(CrashHandlerTest, ACrashWritesTheStep) {
     EXPECT_FALSE(r.has_answer);
     EXPECT_EQ(r.step.sequence, expected.step.sequence);
     const StepReplay replay = replayStep(r);
-    EXPECT_TRUE(compareAnswers(expected.answer, replay.answer).empty());
+    EXPECT_TRUE(compareAnswers(r.options, expected.answer, replay.answer).empty());
   }
 }
 

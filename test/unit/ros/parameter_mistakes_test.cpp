@@ -30,6 +30,19 @@ TEST(Parameters, WordsForTheMapAndTheBodyItselfAreNoNames) {
   }
 }
 
+// A name without a value, and all but the first of several, were passed over.
+TEST(Parameters, WhatAFileSaysInVainIsRefused) {
+  const auto errorIn = [](const std::string& text) { return said<ParameterError>([&] { parseYaml(text, "FILE"); }); };
+  EXPECT_EQ(errorIn("topic: /cloth\nminimum_separation_m:\n"),
+            "FILE:2: minimum_separation_m has no value; write one, or remove the line");
+  EXPECT_EQ(errorIn("bodies:\n  cloth: {topic: /a}\n  rope: {topic: /b}\n  cloth: {topic: /c}\n"),
+            "FILE:4: cloth stands twice");
+  EXPECT_EQ(errorIn("topic: /cloth\n---\nmax_step_s: 0.1\n"),
+            "FILE: holds several documents; write one, without a line ---");
+  EXPECT_FALSE(parseYaml("# nothing\n", "FILE").isSet());
+  EXPECT_EQ(parseYaml("---\ntopic: /cloth\n", "FILE").members.at("topic").text, "/cloth");
+}
+
 TEST(Parameters, WrongTypesAreRefused) {
   expectMistakes({
       {"tolerance_m: 1e-6", "~tolerance_m is a string"},

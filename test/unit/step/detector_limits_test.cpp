@@ -89,6 +89,28 @@ TEST(DetectorLimits, EarliestOnlyEndsTheStepAtTheFirstContact) {
   EXPECT_GE(late, 2u);
 }
 
+// A second triangle arrives while another one rests: beside that nobody looks for what begins later.
+TEST(DetectorLimits, EarliestOnlyNeverSaysThatNothingNewTouchesBesideWhatRests) {
+  TestStep step = crossing();
+  StepBody resting = step.bodies[1];
+  for (Vec3& x : resting.t0) x += Vec3(-1, 0, -1);
+  resting.t1 = resting.t0;
+  step.bodies.push_back(resting);
+  Options options;
+  const Outcome whole = runOnce(step, options);
+  EXPECT_EQ(whole.touching, Touching::NEW);
+  EXPECT_TRUE(whole.excluded.empty());
+  options.earliest_only = true;
+  const Outcome first = runOnce(step, options);
+  EXPECT_TRUE(std::all_of(first.contacts.begin(), first.contacts.end(), [](const Contact& c) { return c.initial; }));
+  EXPECT_EQ(first.touching, Touching::NEW);
+  EXPECT_EQ(first.excluded, std::vector<std::string>{"contacts that begin after the first one by earliest_only"});
+  for (StepBody& body : step.bodies) body.t0[0].z() += 0.1 * (&body != step.bodies.data());
+  for (StepBody& body : step.bodies) body.t1 = body.t0;
+  EXPECT_EQ(runOnce(step, options).touching, Touching::NONE);
+  EXPECT_TRUE(runOnce(step, options).excluded.empty());
+}
+
 // A step whose end is not reached leaves bounds that are none of its end: the one after it makes its own.
 TEST(DetectorLimits, EarliestOnlyLeavesNothingForTheNextStep) {
   TestStep step = crumpled(5, 2, 40);

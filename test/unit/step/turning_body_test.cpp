@@ -1,6 +1,7 @@
 // Rigid bodies that turn: the step is cut into parts whose straight paths stay near the arc.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <random>
@@ -108,6 +109,28 @@ TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
   const Outcome met = step(near, peak(100 * MS, -0.9), 3.1);
   ASSERT_EQ(met.status, StepStatus::OK) << met.reason;
   EXPECT_NEAR(met.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
+}
+
+// It meets one side of a triangle some parts before the other one.
+TEST(TurningBody, TheFirstContactIsThatOfAllParts) {
+  const auto sweep = [](bool earliest_only) {
+    MonitorOptions options = loose();
+    options.detector.earliest_only = earliest_only;
+    Monitor monitor(options, clockAndBar());
+    MeshFrame wide{0, oneTriangle(), {{0, 0, -0.5}, {0.5, 0, -1.6}, {-0.5, 0, -1.6}}};
+    step(monitor, wide, 0);
+    wide.stamp_ns = 100 * MS;
+    return step(monitor, wide, 3.1);
+  };
+  const auto last = [](const Outcome& outcome) {
+    double toc = 0;
+    for (const Contact& c : outcome.contacts) toc = std::max(toc, c.toc_lower);
+    return toc;
+  };
+  const Outcome all = sweep(false), first = sweep(true);
+  EXPECT_EQ(first.earliest_toc, all.earliest_toc);
+  EXPECT_GT(last(all), all.earliest_toc + 0.1) << "else it shows nothing";
+  EXPECT_LT(last(first), all.earliest_toc + 1e-9);
 }
 
 // A step is not split for a body that turns far from all that it is tested against.
