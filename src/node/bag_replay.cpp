@@ -270,8 +270,6 @@ std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
          (more > 0 ? " and " + std::to_string(more) + " more" : "");
 }
 
-BagReplay::~BagReplay() = default;
-
 std::string BagReplay::firstMeshTopic(const std::string& bag, const std::string& clouds) {
   rosbag::Bag file;
   openBag(bag, file);

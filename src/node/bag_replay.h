@@ -61,7 +61,6 @@ class BagReplay {
   /// Where nobody names a topic for the map, and the default one is not in the bag, the bag's first one is taken.
   /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.
   BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
-  ~BagReplay();
 
   /// The first topic of the bag that carries meshes, is no monitor's own and not that of `clouds`, for configurations
   /// that name none. Empty: none.

@@ -194,6 +194,18 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   return true;
 }
 
+StatsContext MonitorPipeline::counters() const {
+  StatsContext context;
+  context.frames = monitor_->total();
+  context.weld_changes = weld_changes_;
+  context.transforms_unusable = transforms_.unusable();
+  context.wrong_row_steps = wrong_row_steps_;
+  context.parameter_hash = config_.hash();
+  context.promises = promises_.promises();
+  context.promises_broken = promises_.brokenPromises();
+  return context;
+}
+
 bool MonitorPipeline::waiting() const {
   if (unplaced_map_ || monitor_->waiting()) return true;
   for (const auto& one : waiting_) {

@@ -18,7 +18,7 @@
 #include "input/transforms.h"
 #include "node/attach_request.h"
 #include "node/effects.h"
-#include "output/statement.h"
+#include "output/output_messages.h"
 
 namespace dccd {
 
@@ -116,10 +116,8 @@ class MonitorPipeline {
   const Statement& statement() const { return statement_; }
   /// How fast bodies are assumed to be, by body.
   std::vector<SpeedBound> speedBounds() const { return config_.speedBounds(monitor_->bodies().size()); }
-  std::uint64_t transformsUnusable() const { return transforms_.unusable(); }
-  std::uint64_t weldChanges() const { return weld_changes_; }
-  /// Clouds with a row_step that their data contradict.
-  std::uint64_t wrongRowSteps() const { return wrong_row_steps_; }
+  /// What it has counted so far; the rest of the context is its owner's.
+  StatsContext counters() const;
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);

@@ -139,20 +139,13 @@ void CollisionMonitor::Impl::lookIntoSilence() {
 }
 
 StatsContext CollisionMonitor::Impl::statsContext() const {
-  StatsContext context;
-  context.frames = pipeline.monitor().total();
-  context.weld_changes = pipeline.weldChanges();
+  StatsContext context = pipeline.counters();
   if (config.monitor.look_ahead_s > 0) context.look_ahead = look_ahead.summary();
   context.steps_unpublished = steps_unpublished;
   context.maps_received = maps ? maps->received() : 0;
   context.frames_handed_over = frames_handed_over;
-  context.transforms_unusable = pipeline.transformsUnusable();
-  context.wrong_row_steps = pipeline.wrongRowSteps();
   context.requests_refused = requests_refused;
   context.maps_refused = maps ? maps->refused() : 0;
-  context.parameter_hash = config.hash();
-  context.promises = pipeline.promises().promises();
-  context.promises_broken = pipeline.promises().brokenPromises();
   return context;
 }
 

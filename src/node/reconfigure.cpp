@@ -1,11 +1,11 @@
 #include "node/reconfigure.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include <boost/thread/recursive_mutex.hpp>
 
@@ -40,6 +40,12 @@ void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions
   });
 }
 
+bool isFinite(const deformable_ccd::CollisionMonitorConfig& live) {
+  dynamic_reconfigure::Config all;
+  live.__toMessage__(all);
+  return std::all_of(all.doubles.begin(), all.doubles.end(), [](const auto& one) { return std::isfinite(one.value); });
+}
+
 /// Whether both messages have the same one value.
 bool isSame(const dynamic_reconfigure::Config& a, const dynamic_reconfigure::Config& b) {
   const auto same = [](const auto& one, const auto& other) {
@@ -61,39 +67,20 @@ std::string textOf(const dynamic_reconfigure::Config& message) {
 
 struct Reconfigure::Impl {
   using Live = deformable_ccd::CollisionMonitorConfig;
-  const MonitorConfig start;  // what cannot be changed live stays as it was
-  const std::vector<Body> bodies;
+  const bool holds_distance;
   Live in_force;
   Events events;
   boost::recursive_mutex mutex;  // shared with the server, which asks for it so that updateConfig cannot deadlock
   dynamic_reconfigure::Server<Live> server;
 
   Impl(const ros::NodeHandle& node, const MonitorConfig& config, Events call)
-      : start(config),
-        bodies(config.monitorBodies()),
-        in_force(toLive(config)),
-        events(std::move(call)),
-        server(mutex, node) {
+      : holds_distance(config.holdsDistance()), in_force(toLive(config)), events(std::move(call)), server(mutex, node) {
     server.updateConfig(in_force);
     bool first = true;  // setCallback calls at once, with what is in force already
     server.setCallback([this, first](Live& live, std::uint32_t) mutable {
       if (!first) apply(live);
       first = false;
     });
-  }
-
-  /// Empty: the monitor takes them.
-  std::string problemOf(const Live& live) const {
-    MonitorOptions options = start.monitor;
-    MarkerConfig markers = start.markers;
-    fromLive(live, options, markers);
-    try {
-      check(options.detector, bodies);
-      const MeshStore store(options.store);
-      return {};
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
   }
 
   /// What the monitor says of them, which also knows what is attached.
@@ -104,40 +91,29 @@ struct Reconfigure::Impl {
     return problem;
   }
 
-  /// Each value by itself: a bad one is refused alone. The server has clamped them to their ranges, which a NaN passes.
+  /// All at once; or where the monitor refuses that, each value by itself, so that a bad one is refused alone. The
+  /// server has clamped them to their ranges, which a NaN passes.
   void apply(Live& live) {
     // The only rung that holds a distance.
-    if (start.holdsDistance() && !holdsDistance(static_cast<Accuracy>(live.accuracy))) {
+    if (holds_distance && !holdsDistance(static_cast<Accuracy>(live.accuracy))) {
       live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);
     }
-    Live wanted = in_force;
-    forEachValue(live, wanted, [this](const Live& tried) { return problemOf(tried); });
-    // All at once; or where the monitor refuses that, too, all that it does not refuse.
-    if (!take(wanted).empty()) {
-      Live taken = in_force;
-      forEachValue(wanted, taken, [this](const Live& tried) { return take(tried); });
-    }
+    if (!isFinite(live) || !take(live).empty()) takeEach(live);
     live = in_force;
   }
 
-  /// Writes the values of `from` into `to` that have no problem there; tells of the others.
-  template <class Problem>
-  void forEachValue(const Live& from, Live& to, const Problem& problemWith) {
+  void takeEach(const Live& wanted) {
     for (const auto& parameter : Live::__getParamDescriptions__()) {
       dynamic_reconfigure::Config value, before;
-      parameter->toMessage(value, from);
-      parameter->toMessage(before, to);
+      parameter->toMessage(value, wanted);
+      parameter->toMessage(before, in_force);
       if (isSame(value, before)) continue;
-      Live tried = to;
+      Live tried = in_force;
       parameter->fromMessage(value, tried);
-      const bool is_number = value.doubles.empty() || std::isfinite(value.doubles.front().value);
-      const std::string problem = is_number ? problemWith(tried) : "it is no number";
-      if (problem.empty()) {
-        to = tried;
-      } else {
-        events.refused("~live/" + parameter->name + " " + textOf(value) + " was refused, " + textOf(before) +
-                       " stays: " + problem);
-      }
+      const std::string problem = isFinite(tried) ? take(tried) : "it is no number";
+      if (problem.empty()) continue;
+      events.refused("~live/" + parameter->name + " " + textOf(value) + " was refused, " + textOf(before) +
+                     " stays: " + problem);
     }
   }
 };

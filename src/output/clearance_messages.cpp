@@ -6,7 +6,6 @@
 
 #include "output/output_messages.h"
 #include "output/patch_messages.h"
-#include "report/words.h"
 
 namespace dccd {
 namespace {
@@ -19,8 +18,6 @@ static_assert(static_cast<int>(ClearanceStatus::UNKNOWN) == static_cast<int>(Dis
 
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 constexpr double ROUNDING = 1 + 1e-12;  // of the few operations of a speed
-
-double plottable(double value) { return std::isfinite(value) ? value : NONE; }
 
 /// In the step no point of the body was faster [m/s]. One that turns goes along arcs about its frame's origin.
 double speedBound(const Body& body, double duration_s) {
@@ -75,11 +72,11 @@ deformable_ccd::Clearance toMessage(const Outcome& outcome, const Clearance& cle
   const std::array<Vec3, 2>& points = clearance.at_end.point;
   const Vec3 direction = (points[0] - points[1]) / (points[0] - points[1]).norm();  // NaN where one has no place
   put(direction, out.direction);
+  putNames(clearance.body, bodies, out.bodies);
   double speed = 0;
   Vec3 closing = Vec3::Zero();
   for (std::size_t side = 0; side < 2; ++side) {
     const std::uint16_t body = clearance.body[side];
-    out.bodies[side] = bodyName(body, bodies);
     if (body == OBSTACLE_BODY) continue;  // at rest
     speed += speeds[body];
     if (!direction.allFinite() || clearance.at_end.vertex[side][0] == NO_INDEX) continue;

@@ -8,7 +8,7 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/time.h>
 
-#include "report/latency_histogram.h"
+#include "output/latency_histogram.h"
 
 namespace dccd {
 

@@ -35,9 +35,6 @@ static_assert(static_cast<int>(Touching::NEW) == static_cast<int>(deformable_ccd
 static_assert(static_cast<int>(Touching::EXPECTED) == static_cast<int>(deformable_ccd::State::EXPECTED));
 static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
-/// What is not there is NaN: plots leave it out, while an infinity takes their axes away.
-double plottable(double value) { return std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN(); }
-
 /// What most messages say first.
 template <class Message>
 void fillHead(const Outcome& outcome, StampNs stamp_ns, const std::string& frame, Message& out) {
@@ -137,6 +134,8 @@ void resizeKept(std::vector<T>& list, std::size_t count) {
 }
 
 }  // namespace
+
+double plottable(double value) { return std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN(); }
 
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
   std_msgs::Header out;

@@ -16,6 +16,7 @@
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "output/statement.h"
+#include "report/words.h"
 
 namespace dccd {
 
@@ -41,6 +42,13 @@ void put(const Vec3& from, Point& to) {
   to.x = from.x();
   to.y = from.y();
   to.z = from.z();
+}
+/// What is not there is NaN: plots leave it out, while an infinity takes their axes away.
+double plottable(double value);
+/// Of two partners.
+template <class Names>
+void putNames(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies, Names& out) {
+  for (std::size_t side = 0; side < 2; ++side) out[side] = bodyName(body[side], bodies);
 }
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame);
 /// With its geometry; `patch`: identity of its patch, 0 for none.

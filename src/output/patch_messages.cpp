@@ -8,7 +8,6 @@
 #include "dccd/contact_fields.h"
 #include "dccd/new_contacts.h"
 #include "output/output_messages.h"
-#include "report/words.h"
 
 namespace dccd {
 namespace {
@@ -21,11 +20,6 @@ static_assert(static_cast<int>(PatchEventKind::ENDED) == static_cast<int>(EventM
 static_assert(static_cast<int>(PatchEventKind::SPLIT) == static_cast<int>(EventMessage::SPLIT));
 static_assert(static_cast<int>(PatchEventKind::UNEXPECTED) == static_cast<int>(EventMessage::UNEXPECTED));
 
-template <class Names>
-void fillNames(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies, Names& out) {
-  for (std::size_t side = 0; side < 2; ++side) out[side] = bodyName(body[side], bodies);
-}
-
 ros::Time knownTime(StampNs stamp_ns) { return stamp_ns == UNKNOWN_NS ? ros::Time() : toRosTime(stamp_ns); }
 
 PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
@@ -33,7 +27,7 @@ PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
   const auto fill = [&](const auto& from, auto& to) {
     using To = std::decay_t<decltype(to)>;
     if constexpr (std::is_same_v<To, PatchMessage::_bodies_type>) {
-      fillNames(from, bodies, to);
+      putNames(from, bodies, to);
     } else if constexpr (std::is_same_v<To, ros::Time>) {
       to = knownTime(from);
     } else if constexpr (std::is_same_v<std::decay_t<decltype(from)>, Box>) {
@@ -99,7 +93,7 @@ std::vector<EventMessage> toPatchEvents(const Outcome& outcome, const std::vecto
     out.kind = static_cast<std::uint8_t>(event.kind);
     out.id = event.id;
     out.others = event.others;
-    fillNames(event.body, bodies, out.bodies);
+    putNames(event.body, bodies, out.bodies);
     out.expected = event.expected;
     out.beginning = static_cast<std::uint8_t>(event.beginning);
     out.earliest = knownTime(event.from_ns);
@@ -114,7 +108,7 @@ std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, 
   std::vector<deformable_ccd::PairContact> all;
   for (const NewContact& one : newContacts(outcome)) {
     deformable_ccd::PairContact out;
-    fillNames(one.body, bodies, out.bodies);
+    putNames(one.body, bodies, out.bodies);
     out.patch = one.patch;
     out.contact = toContact(outcome, one.contact, one.patch);
     out.earliest = toRosTime(outcome.stampBefore(one.contact.toc_lower));

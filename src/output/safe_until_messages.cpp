@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "output/output_messages.h"
-#include "report/words.h"
 
 namespace dccd {
 namespace {
@@ -13,10 +12,7 @@ namespace {
 template <class Message>
 void fillPair(const Outcome& outcome, std::size_t limiting, Message& out) {
   if (limiting == SafeUntil::NO_PAIR) return;
-  const std::vector<Body>& bodies = outcome.step->bodies;
-  for (std::size_t side = 0; side < 2; ++side) {
-    out.bodies[side] = bodyName(outcome.clearances[limiting].body[side], bodies);
-  }
+  putNames(outcome.clearances[limiting].body, outcome.step->bodies, out.bodies);
 }
 
 /// What is assumed of one body's speed.

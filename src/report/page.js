@@ -106,18 +106,6 @@ document.getElementById('headline').textContent = R.headline;
   el('line', { x1: LEFT, x2: W - RIGHT, y1: a.y(R.total.median_ms), y2: a.y(R.total.median_ms), stroke: '#f0a030' }, a.svg);
   document.getElementById('latency_note').textContent = `Median ${number(R.total.median_ms)} ms (orange line), 95 % below ` +
     `${number(R.total.p95_ms)} ms, 99 % below ${number(R.total.p99_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
-{ const H = 160, floor = H - 34, bins = R.histogram, most = Math.max(1, ...bins.map(b => b.steps));
-  const w = (W - LEFT - RIGHT) / Math.max(bins.length, 1), every = Math.ceil(bins.length / Math.min(10, W / 80));
-  const svg = el('svg', { viewBox: `0 0 ${W} ${H}` }, document.getElementById('histogram'));
-  ticks(most, true).forEach(v => { const y = floor - (floor - 10) * v / most;
-    el('line', { x1: LEFT, x2: W - RIGHT, y1: y, y2: y, stroke: '#e3e8ee' }, svg);
-    el('text', { x: LEFT - 6, y: y + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
-  el('text', { x: 11, y: floor / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 11 ${floor / 2})`,
-    'text-anchor': 'middle' }, svg, 'steps');
-  bins.forEach((b, i) => { const h = (floor - 10) * b.steps / most, upper = short(b.upper_ms) + ' ms';
-    const bar = el('rect', { x: LEFT + i * w, y: floor - h, width: Math.max(1, w - 1), height: h, fill: '#2a6fb0' }, svg);
-    el('title', {}, bar, `${b.steps} steps of up to ${upper}`);
-    if (i % every == 0 && i + 1 < bins.length) el('text', { x: LEFT + (i + 1) * w, y: floor + 18, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg, upper); }); }
 
 // Points {x, y, name, group, missed, invented}: time across, error up, both logarithmic. Errors below `least` are drawn there.
 const COLOURS = ['#1c2430', '#2a6fb0', '#f0a030', '#3d9a50', '#8e5bb0', '#b71c1c', '#7a8794'];

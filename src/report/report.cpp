@@ -198,7 +198,6 @@ void Report::addTimes(const Outcome& o) {
   sum_ += o.stats;
   if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
   total_ms_.push_back(o.stats.total_ms);
-  step_times_.add(o.stats.total_ms * 1e-3);
 }
 
 void Report::add(const Outcome& o, const std::vector<Body>& bodies) {

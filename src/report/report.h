@@ -15,7 +15,6 @@
 #include "dccd/stream.h"
 #include "report/clearance_table.h"
 #include "report/lanes.h"
-#include "report/latency_histogram.h"
 #include "report/player_data.h"
 
 namespace dccd {
@@ -96,7 +95,6 @@ class Report {
   std::size_t left_out_ = 0;
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;
-  LatencyHistogram step_times_;
   std::vector<EffectDecision> effects_;
   ContactLanes lanes_;
   ClearanceTable clearance_;

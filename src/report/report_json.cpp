@@ -162,10 +162,6 @@ nlohmann::json Report::json() const {
                 {"p95_ms", quantile(total_ms_, 0.95)},
                 {"p99_ms", quantile(total_ms_, 0.99)},
                 {"max_ms", quantile(total_ms_, 1)}};
-  j["histogram"] = nlohmann::json::array();
-  for (const LatencyHistogram::Bin& bin : step_times_.bins()) {
-    j["histogram"].push_back({{"upper_ms", bin.upper_s * 1e3}, {"steps", bin.count}});
-  }
   j["effects"] = effectsJson();
   for (const StepCounter& counter : STEP_COUNTERS) j["step_counters"][counter.name] = sum_.*counter.value;
   j["left_out"] = {{"pairs", left_out_}};

@@ -369,10 +369,10 @@ class TroubleshootingTest(unittest.TestCase):
     def test_every_tested_mistake_is_on_the_page(self):
         page = (CHECKOUT / 'doc/troubleshooting.md').read_text()
         test = (CHECKOUT / 'test/ros/mistakes_test.cpp').read_text()
-        calls = re.findall(r'expectTold\("/\w+",\s*"((?:[^"\\]|\\.)*)",\s*"((?:[^"\\]|\\.)*)"', test)
+        calls = re.findall(r'\{"/\w+",\s*"((?:[^"\\]|\\.)*)",(?:\s*//.*)?\s*"((?:[^"\\]|\\.)*)"', test)
         self.assertGreaterEqual(len(calls), 10)
         # Names of topics are the test's own.
-        same = [re.sub(r'/\w+/(octomap|cloth)', r'/\1', text).replace('/octomap_binary', '/octomap') for call in calls for text in call]
+        same = [re.sub(r'/\w+/(octomap|cloth)', r'/\1', text).replace('/a_tracker/', '/tracker/').replace('/octomap_binary', '/octomap') for call in calls for text in call]
         page = page.replace('/octomap_binary', '/octomap')
         self.assertEqual([text for text in same if text not in page], [])
 

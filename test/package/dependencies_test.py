@@ -54,12 +54,6 @@ class DependenciesTest(unittest.TestCase):
         self.assertEqual((only_tests - others) & in_build, set())
         self.assertEqual(others - in_build - in_rviz - FROM_OVERLAY, set())
 
-    def test_catkin_components_are_declared(self):
-        text = (CHECKOUT / 'CMakeLists.txt').read_text()
-        components = re.search(r'find_package\(catkin REQUIRED COMPONENTS([^)]*)\)', text).group(1).split()
-        self.assertGreater(len(components), 10)
-        self.assertEqual(set(components) - package_keys(), set())
-
     def test_overlay_is_what_package_xml_asks_for(self):
         root = ElementTree.parse(CHECKOUT / 'dependencies/octomap_msgs/package.xml').getroot()
         self.assertEqual({root.find('name').text}, FROM_OVERLAY)

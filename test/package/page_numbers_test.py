@@ -42,7 +42,7 @@ NUMBERS = {
     ],
     'doc/interface.md': [
         (r'(\d+) steps wait at most', lambda: constant('include/dccd/stream.h', 'max_waiting')),
-        (r'box around them, ([\d,]+) at most', lambda: constant('src/output/markers.cpp', 'MAX_VOXELS_SHOWN')),
+        (r'box around them, ([\d,]+) at most', lambda: constant('src/output/scene_markers.cpp', 'MAX_VOXELS_SHOWN')),
         (r'be counted, (\d+) million voxels', lambda: constant('include/dccd/known_space.h', 'MOST_BLOCKS') * 64 / 10**6),
         (r'stops looking at (\d+) contacts a MB', lambda: MB / 4 / tolerance('BYTES_PER_CONTACT')),
         (r'and at (\d+) for each vertex, edge', lambda: tolerance('CONTACTS_PER_FEATURE')),

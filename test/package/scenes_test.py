@@ -2,15 +2,13 @@
 import collections
 import copy
 import csv
+import functools
 import itertools
 import json
 import math
 import os
-import pathlib
-import shutil
 import struct
 import subprocess
-import tempfile
 import unittest
 
 import rosbag
@@ -26,8 +24,9 @@ def run(*command):
     return subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
 
 
+@functools.lru_cache(maxsize=None)
 def analyse(scene, folder):
-    """Records and analyses a scene; its steps, and report.json."""
+    """Records and analyses a scene, once; its steps, and report.json."""
     bag, config = folder / (scene.stem + '.bag'), folder / (scene.stem + '.yaml')
     recorded = run(TOOLS / 'make_scene_bag', scene, bag, '--monitor-config', config, '--quiet')
     assert recorded.returncode == 0, recorded.stderr
@@ -68,11 +67,7 @@ def events_of(report):
             for row in rows_of(report / 'events.csv')]
 
 
-class SceneFactsTest(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(dir=CHECKOUT / 'build'))
-        self.addCleanup(shutil.rmtree, self.folder)
-
+class SceneFactsTest(FolderTestCase):
     def check_effects(self, monitor, report):
         """What runs is what the scene lists, each with its reason; what does not run has counted nothing."""
         effects = {e['name']: e for e in report['effects'] if e['name'] != 'octomap_corner_face'}
@@ -149,14 +144,11 @@ class SceneFactsTest(unittest.TestCase):
         self.assertEqual(broken_facts(expect, []), ['no step was answered'])
 
 
-class MakeSceneBagTest(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(dir=CHECKOUT / 'build'))
-        self.addCleanup(shutil.rmtree, self.folder)
-        self.scene = CHECKOUT / 'config/scenes/table_edge.yaml'
+class MakeSceneBagTest(FolderTestCase):
+    SCENE = CHECKOUT / 'config/scenes/table_edge.yaml'
 
     def record(self, name, *options):
-        result = run(TOOLS / 'make_scene_bag', self.scene, self.folder / name, '--frames', '6', '--quiet', *options)
+        result = run(TOOLS / 'make_scene_bag', self.SCENE, self.folder / name, '--frames', '6', '--quiet', *options)
         self.assertEqual(result.returncode, 0, result.stderr)
         return (self.folder / name).read_bytes()
 
@@ -177,7 +169,7 @@ class MakeSceneBagTest(unittest.TestCase):
 
     def test_bad_scenes_are_refused_with_file_line_and_key(self):
         bad = self.folder / 'bad.yaml'
-        bad.write_text(self.scene.read_text().replace('mass_kg: 0.15', 'mass_kg: heavy'))
+        bad.write_text(self.SCENE.read_text().replace('mass_kg: 0.15', 'mass_kg: heavy'))
         result = run(TOOLS / 'make_scene_bag', bad, self.folder / 'e.bag')
         self.assertEqual(result.returncode, 1)
         line = 1 + bad.read_text().split('mass_kg')[0].count('\n')
@@ -188,7 +180,7 @@ class MakeSceneBagTest(unittest.TestCase):
 
     def test_what_contradicts_itself_is_refused_before_anything_is_recorded(self):
         """The monitor's block is read as the node reads it: file, parameter, and what to write instead."""
-        felt, table = (CHECKOUT / 'config/scenes/felt_and_finger.yaml').read_text(), self.scene.read_text()
+        felt, table = (CHECKOUT / 'config/scenes/felt_and_finger.yaml').read_text(), self.SCENE.read_text()
         mesh, bag = 'package://deformable_ccd/config/scenes/meshes/finger.obj', self.folder / 'e.bag'
         no_mesh = self.folder / 'no_mesh.stl'
         no_mesh.write_text('this is no mesh')
@@ -220,7 +212,7 @@ class MakeSceneBagTest(unittest.TestCase):
                 self.assertFalse(bag.exists(), 'nothing is recorded')
 
     def test_a_bag_that_cannot_be_written_is_an_error(self):
-        result = run(TOOLS / 'make_scene_bag', self.scene, self.folder / 'no' / 'such' / 'f.bag', '--frames', '2')
+        result = run(TOOLS / 'make_scene_bag', self.SCENE, self.folder / 'no' / 'such' / 'f.bag', '--frames', '2')
         self.assertEqual(result.returncode, 1)
         self.assertIn('f.bag', result.stderr)
 

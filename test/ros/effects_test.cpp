@@ -1,12 +1,10 @@
-// Effects through the live node: what is left out of the map, separations of bodies and of pairs, ropes,
-// and rigid bodies that turn.
+// Effects through the live node: separations of bodies and of pairs, distances, ropes, and rigid bodies that turn.
 #include <deformable_ccd/ClearanceArray.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/LeftOutPairs.h>
 #include <deformable_ccd/State.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -19,53 +17,7 @@ namespace dccd {
 namespace test {
 namespace {
 
-constexpr std::size_t MONITORS = 4;  // in effects.test; each listens to /tf
-
-using ContactMessage = deformable_ccd::ContactArray::_contacts_type::value_type;
-
-// --- a grid above a block of voxels ----------------------------------------------------------------------------------
-
-struct Filtered : MonitorTest {
-  Filtered() : MonitorTest("/filtered") {}
-  ros::Publisher mesh = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/filtered/mesh");
-  ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/filtered/octomap", true);
-
-  /// A step between two heights that has seen the map, with the stamp of its end.
-  deformable_ccd::ContactArray step(double from_z, double to_z, double end_s) {
-    map.publish(blockBelowZero(true));
-    double stamp_s = end_s - 40;
-    EXPECT_TRUE(waitUntil([&] {
-      const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, from_z), stamp_s += 0.1));
-      return outcome.answered && outcome.status != deformable_ccd::ContactArray::NO_MAP;
-    }));
-    send(mesh, cloud(gridAt(3, 4, from_z), end_s - 0.1));
-    const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, to_z), end_s));
-    EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(end_s); }));
-    return outcome;
-  }
-};
-
-TEST_F(Filtered, MaskedVerticesAndExcludedBoxesMeetNothing) {
-  const deformable_ccd::ContactArray outcome = step(0.3, -0.05, 50);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  std::size_t vertices = 0;
-  for (const ContactMessage& contact : outcome.contacts) {
-    vertices += contact.kind == ContactMessage::VERTEX_VOXEL_FACE;
-    for (const std::uint32_t under : {1u, 4u, 5u}) {
-      EXPECT_FALSE(contact.kind == ContactMessage::VERTEX_VOXEL_FACE && contact.vertex[0] == under)
-          << "falls on the leaf that is left out";
-    }
-    EXPECT_FALSE(std::count(contact.vertex.begin(), contact.vertex.end(), 0u)) << "no feature of a masked vertex";
-  }
-  EXPECT_EQ(vertices, 8u) << "all others of 12";
-}
-
-TEST_F(Filtered, InitialContactsAreSuppressedByChoiceAndCounted) {
-  const deformable_ccd::ContactArray outcome = step(-0.05, -0.06, 50);
-  EXPECT_TRUE(outcome.contacts.empty()) << "all of it has been inside from the start";
-  EXPECT_GT(stats.last().suppressed, 0u);
-  EXPECT_FALSE(clear.last().data) << "suppressed is not clear";
-}
+constexpr std::size_t MONITORS = 3;  // in effects.test; each listens to /tf
 
 // --- separations -----------------------------------------------------------------------------------------------------
 

@@ -8,6 +8,8 @@
 #include <std_msgs/Float64.h>
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
 #include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
@@ -17,58 +19,58 @@ namespace dccd {
 namespace test {
 namespace {
 
-class SlowTheArm : public ::testing::TestWithParam<const char*> {
- protected:
-  SlowTheArm()
-      : scale(node, "/" + std::string(GetParam()) + "/scale"),
-        monitor(advertiseAndWait<deformable_ccd::SpeedScale>(node, "/played/speed_scale", true, 2)) {}
+struct SlowTheArm : ::testing::Test {
+  ros::NodeHandle node;
+  std::array<Probe<std_msgs::Float64>, 2> scales{Probe<std_msgs::Float64>(node, "/cpp/scale"),
+                                                 Probe<std_msgs::Float64>(node, "/python/scale")};
+  ros::Publisher monitor = advertiseAndWait<deformable_ccd::SpeedScale>(node, "/played/speed_scale", true, 2);
+  ros::Time holds_until{1000};
 
-  /// The monitor says this of a new frame, or of the same again, until the client says what is wanted steadily.
-  void expectScale(double said, bool new_frames, double wanted, const std::string& why) {
-    int steady = 0;
-    std::size_t seen = scale.count();
+  /// The monitor says this of a new frame, or of the same again, until both clients say steadily what is wanted. What
+  /// they said meanwhile, and the last word before it.
+  std::array<std::vector<double>, 2> expectScale(double said, bool new_frames, double wanted, const std::string& why) {
+    std::array<std::vector<double>, 2> all;
+    std::array<std::size_t, 2> seen{}, steady{};
+    for (std::size_t c = 0; c < 2; ++c) {
+      seen[c] = scales[c].count();
+      all[c].push_back(scales[c].last().data);
+    }
     EXPECT_TRUE(waitUntil([&] {
       deformable_ccd::SpeedScale message;
       message.scale = said;
-      if (new_frames) holds_until_ += ros::Duration(0.03);
-      message.holds_until = holds_until_;
+      if (new_frames) holds_until += ros::Duration(0.03);
+      message.holds_until = holds_until;
       monitor.publish(message);
       ros::WallDuration(1.0 / 30).sleep();
-      for (; seen < scale.count(); ++seen) steady = scale.all()[seen].data == wanted ? steady + 1 : 0;
-      return steady >= 5;
+      for (std::size_t c = 0; c < 2; ++c) {
+        const auto told = scales[c].all();
+        for (; seen[c] < told.size(); ++seen[c]) {
+          all[c].push_back(told[seen[c]].data);
+          steady[c] = all[c].back() == wanted ? steady[c] + 1 : 0;
+        }
+      }
+      return steady[0] >= 5 && steady[1] >= 5;
     })) << why
-        << ": " << scale.last().data;
+        << ": cpp " << all[0].back() << ", python " << all[1].back();
+    return all;
   }
-
-  ros::NodeHandle node;
-  Probe<std_msgs::Float64> scale;
-  ros::Publisher monitor;
-  ros::Time holds_until_{1000};
 };
 
-TEST_P(SlowTheArm, TakesTheScaleAsLongAsItIsNews) {
-  EXPECT_TRUE(waitUntil([&] { return scale.count() > 0; }));
-  EXPECT_EQ(scale.last().data, 0) << "nothing has been heard";
+TEST_F(SlowTheArm, TakesTheScaleAsLongAsItIsNews) {
+  for (const auto& scale : scales) EXPECT_EQ(scale.after(0).data, 0) << "nothing has been heard";
   expectScale(0.25, true, 0.25, "as it is said");
   expectScale(1, true, 1, "full speed");
-  const std::size_t before = scale.count();
-  expectScale(0, true, 0, "nothing is proved");
-  const auto all = scale.all();
-  for (std::size_t i = before; i < all.size(); ++i) {
-    EXPECT_TRUE(all[i].data == 1 || all[i].data == 0) << "it falls at once, not by and by: " << all[i].data;
+  for (const std::vector<double>& said : expectScale(0, true, 0, "nothing is proved")) {
+    for (const double one : said) EXPECT_TRUE(one == 1 || one == 0) << "it falls at once, not by and by: " << one;
   }
-  const std::size_t risen = all.size();
-  expectScale(1, true, 1, "it rises again");
-  double steepest = 0;
-  const auto more = scale.all();
-  for (std::size_t i = risen; i < more.size(); ++i) steepest = std::max(steepest, more[i].data - more[i - 1].data);
-  EXPECT_NEAR(steepest, 0.04, 1e-9) << "evenly, 2 a second";
+  for (const std::vector<double>& said : expectScale(1, true, 1, "it rises again")) {
+    double steepest = 0;
+    for (std::size_t i = 1; i < said.size(); ++i) steepest = std::max(steepest, said[i] - said[i - 1]);
+    EXPECT_NEAR(steepest, 0.04, 1e-9) << "evenly, 2 a second";
+  }
   expectScale(1, false, 0, "the same frame again and again, which grows old");
   expectScale(2, true, 1, "never more than full speed");
 }
-
-INSTANTIATE_TEST_SUITE_P(Clients, SlowTheArm, ::testing::Values("cpp", "python"),
-                         [](const auto& info) { return std::string(info.param); });
 
 TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
   ros::NodeHandle node;

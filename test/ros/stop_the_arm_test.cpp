@@ -5,6 +5,8 @@
 #include <ros/ros.h>
 #include <std_msgs/Bool.h>
 
+#include <algorithm>
+#include <array>
 #include <limits>
 
 #include "ros/support/live_tests.h"
@@ -49,28 +51,37 @@ class PlayedMonitor {
   ros::Time holds_until_{1000};
 };
 
-class StopTheArm : public ::testing::TestWithParam<const char*> {
- protected:
-  StopTheArm() : stop(node, "/" + std::string(GetParam()) + "/stop"), monitor(node) {}
+/// What one of the examples says.
+struct Client {
+  Client(ros::NodeHandle& node, const std::string& client) : name(client), stop(node, "/" + client + "/stop") {}
+  std::string name;
+  Probe<std_msgs::Bool> stop;
+};
 
-  /// The monitor goes on until the client says so steadily.
+struct StopTheArm : ::testing::Test {
+  ros::NodeHandle node;
+  std::array<Client, 2> clients{Client(node, "cpp"), Client(node, "python")};
+  PlayedMonitor monitor{node};
+
+  /// The monitor goes on until both clients say so steadily.
   void expectStop(bool wanted, const std::string& why) {
-    int steady = 0;
-    std::size_t seen = stop.count();
+    std::array<std::size_t, 2> seen{clients[0].stop.count(), clients[1].stop.count()}, steady{};
     EXPECT_TRUE(waitUntil([&] {
       monitor.speak();
       ros::WallDuration(1.0 / 30).sleep();
-      for (; seen < stop.count(); ++seen) steady = static_cast<bool>(stop.all()[seen].data) == wanted ? steady + 1 : 0;
-      return steady >= 5;
-    })) << why;
+      for (std::size_t c = 0; c < clients.size(); ++c) {
+        const auto said = clients[c].stop.all();
+        for (; seen[c] < said.size(); ++seen[c]) {
+          steady[c] = static_cast<bool>(said[seen[c]].data) == wanted ? steady[c] + 1 : 0;
+        }
+      }
+      return steady[0] >= 5 && steady[1] >= 5;
+    })) << why
+        << ": cpp " << steady[0] << " times, python " << steady[1];
   }
-
-  ros::NodeHandle node;
-  Probe<std_msgs::Bool> stop;
-  PlayedMonitor monitor;
 };
 
-TEST_P(StopTheArm, WheneverItCannotKnow) {
+TEST_F(StopTheArm, WheneverItCannotKnow) {
   monitor.silent = true;
   expectStop(true, "nothing has been heard");
   monitor.silent = false;
@@ -89,7 +100,7 @@ TEST_P(StopTheArm, WheneverItCannotKnow) {
   expectStop(false, "new frames");
 }
 
-TEST_P(StopTheArm, InTime) {
+TEST_F(StopTheArm, InTime) {
   monitor.contact_in_s = 0.9;
   expectStop(false, "0.9 s are enough to stop in 0.3 s");
   monitor.contact_in_s = 0.29;
@@ -117,34 +128,30 @@ TEST_P(StopTheArm, InTime) {
   expectStop(true, "no answer is not \"no contact\"");
 }
 
-INSTANTIATE_TEST_SUITE_P(Clients, StopTheArm, ::testing::Values("cpp", "python"),
-                         [](const auto& info) { return std::string(info.param); });
-
-class WithTheMonitor : public ::testing::TestWithParam<const char*> {};
-
-TEST_P(WithTheMonitor, StopsBeforeTheTipArrives) {
+TEST(WithTheMonitor, BothStopBeforeTheTipArrives) {
   ros::NodeHandle node;
-  Probe<std_msgs::Bool> stop(node, "/" + std::string(GetParam()) + "/stop");
+  std::array<Client, 2> clients{Client(node, "live_cpp"), Client(node, "live_python")};
+  std::array<double, 2> stopped_at{-1, -1};
+  std::array<bool, 2> went{};
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/mesh");
-  // A tip sinks towards a triangle at 0.5 m/s: it goes on while it is far, and stops before it has arrived.
+  // A tip sinks towards a triangle at 0.5 m/s: they go on while it is far, and stop before it has arrived.
   const ros::SteadyTime start = ros::SteadyTime::now();
-  bool went = false;
-  double height = 1, stopped_at = -1;
-  while (height > 0 && stopped_at < 0) {
+  for (double height = 1; height > 0 && *std::min_element(stopped_at.begin(), stopped_at.end()) < 0;) {
     height = 1 - 0.5 * (ros::SteadyTime::now() - start).toSec();
     publisher.publish(meshStamped(tipAbove(height), 1000 - 2 * height));
     ros::WallDuration(1.0 / 30).sleep();
-    const bool says_stop = stop.count() == 0 || stop.last().data;
-    went = went || !says_stop;
-    if (went && says_stop) stopped_at = height;
+    for (std::size_t c = 0; c < clients.size(); ++c) {
+      const bool says_stop = clients[c].stop.count() == 0 || clients[c].stop.last().data;
+      went[c] = went[c] || !says_stop;
+      if (went[c] && says_stop && stopped_at[c] < 0) stopped_at[c] = height;
+    }
   }
-  EXPECT_TRUE(went) << "it never let the arm move";
-  EXPECT_GT(stopped_at, 0) << "it stopped after the contact, or never";
-  EXPECT_LT(stopped_at, 0.5) << "a second of look-ahead at 0.5 m/s";
+  for (std::size_t c = 0; c < clients.size(); ++c) {
+    EXPECT_TRUE(went[c]) << clients[c].name << " never let the arm move";
+    EXPECT_GT(stopped_at[c], 0) << clients[c].name << " stopped after the contact, or never";
+    EXPECT_LT(stopped_at[c], 0.5) << clients[c].name << ": a second of look-ahead at 0.5 m/s";
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(Clients, WithTheMonitor, ::testing::Values("live_cpp", "live_python"),
-                         [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
 }  // namespace test

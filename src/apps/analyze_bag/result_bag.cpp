@@ -25,15 +25,9 @@ void ResultBag::write(const char* name, const ros::Time& at, const Message& mess
 
 /// What is counted of the run so far, with or without an outcome.
 static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far) {
-  StatsContext context;
-  context.frames = pipeline.monitor().total();
-  context.weld_changes = pipeline.weldChanges();
-  context.transforms_unusable = pipeline.transformsUnusable();
-  context.wrong_row_steps = pipeline.wrongRowSteps();
+  StatsContext context = pipeline.counters();
   context.maps_received = so_far.maps;
   context.maps_refused = so_far.maps_refused;
-  context.promises = pipeline.promises().promises();
-  context.promises_broken = pipeline.promises().brokenPromises();
   return context;
 }
 
@@ -73,7 +67,6 @@ StatsContext ResultBag::contextOf(const Outcome& outcome, const MonitorPipeline&
   }
   if (!pipeline.fixedFrame().empty()) ++markers_built_;  // before a frame was taken there is none to draw in
   context.markers_built = markers_built_;
-  context.parameter_hash = pipeline.config().hash();
   return context;
 }
 

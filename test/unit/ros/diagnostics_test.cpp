@@ -50,6 +50,22 @@ TEST(Diagnostics, AMapThatIsNotThereHasNoAge) {
   EXPECT_EQ(valueOf(diagnostics.take(2 * SECOND_NS, ros::Time(2), {}, true, "", ""), "map age [s]"), "3");
 }
 
+TEST(Diagnostics, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {
+  Diagnostics diagnostics("/monitor");
+  Outcome answer, none;
+  answer.answered = true;
+  answer.status = StepStatus::OK;
+  answer.step = share(Step());
+  none.status = StepStatus::DUPLICATE;
+  const auto levelAfter = [&](std::int64_t second) {
+    for (const Outcome& outcome : {answer, none}) diagnostics.add(outcome, 0);
+    return diagnostics.take(second * SECOND_NS, ros::Time(1), {}, true, "/map", "").status.at(0).level;
+  };
+  EXPECT_EQ(levelAfter(1), diagnostic_msgs::DiagnosticStatus::WARN) << "no octomap";
+  answer.obstacle = VoxelSurface::build(0.1, {{{0, 0, 0}, 1}});
+  EXPECT_EQ(levelAfter(2), diagnostic_msgs::DiagnosticStatus::OK);
+}
+
 TEST(Diagnostics, RatesAreThoseOfThePeriod) {
   Diagnostics diagnostics("/monitor");
   Outcome answer, none;

@@ -2,8 +2,10 @@
 // alone.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <set>
 
 #include "dccd/assurance.h"
 #include "support/said.h"
@@ -19,6 +21,34 @@ TEST(VertexMask, BeyondTheMeshIsNoStepAtAll) {
   Driven masked(tree);
   EXPECT_EQ(masked.feed(1, 0.35f).status, StepStatus::VERTEX_COUNT);
   EXPECT_EQ(masked.outcome.reason, "parameter vertex_mask of body 'mesh' names vertex 4, but the mesh has 4");
+}
+
+TEST(VertexMask, AMaskedVertexAndAnExcludedBoxMeetNothing) {
+  XmlRpcValue tree = scene();
+  tree["vertex_mask"][0] = 0;
+  const double below_1[] = {0.2, 0.1, -0.2, 0.3, 0.2, 0};
+  for (int i = 0; i < 6; ++i) tree["exclude_boxes"][0][i] = below_1[i];
+  Driven driven(tree);
+  driven.giveMap(1);
+  driven.feed(1, 0.35f);
+  std::set<Index> met;
+  for (const Contact& contact : driven.feed(1.1, -0.05f).contacts) {
+    if (contact.kind == PairKind::VERTEX_VOXEL_FACE) met.insert(contact.vertex[0]);
+    EXPECT_EQ(std::count(contact.vertex.begin(), contact.vertex.end(), 0u), 0) << "no feature of a masked vertex";
+  }
+  EXPECT_EQ(met, (std::set<Index>{2, 3}));
+}
+
+TEST(InitialContacts, AreSuppressedByChoiceAndCounted) {
+  XmlRpcValue tree = scene();
+  tree["initial_contacts"] = "suppress";
+  Driven driven(tree);
+  driven.giveMap(1);
+  driven.feed(1, -0.05f);
+  const Outcome& outcome = driven.feed(1.1, -0.06f);
+  EXPECT_TRUE(outcome.answered && outcome.contacts.empty()) << "all of it has been inside from the start";
+  EXPECT_GT(outcome.suppressed, 0u);
+  EXPECT_FALSE(assuranceOf(outcome).clear());
 }
 
 XmlRpcValue expecting(const std::string& phase = "") {

@@ -117,7 +117,7 @@ TEST(RowStep, WrongOnesAreCountedAndSaidOnce) {
     ASSERT_TRUE(cloth.pipeline.nextOutcome(0, cloth.outcome));
     EXPECT_EQ(cloth.outcome.status, StepStatus::OK) << "the step goes on: " << cloth.outcome.reason;
   }
-  EXPECT_EQ(cloth.pipeline.wrongRowSteps(), 2u);
+  EXPECT_EQ(cloth.pipeline.counters().wrong_row_steps, 2u);
   EXPECT_NE(cloth.pipeline.hint(0).find("row_step 64 contradicts the data"), std::string::npos);
 }
 

@@ -38,15 +38,15 @@ TEST(Weld, AResetWeldsAnew) {
     return welded.outcome.answered ? welded.outcome.step->bodies[0].topology->vertexCount() : 0;
   };
   EXPECT_EQ(vertices(0), 4u);
-  EXPECT_EQ(welded.pipeline.weldChanges(), 0u);
+  EXPECT_EQ(welded.pipeline.counters().weld_changes, 0u);
   EXPECT_EQ(vertices(0.5), 6u);
-  EXPECT_EQ(welded.pipeline.weldChanges(), 2u) << "vertices that came apart, not frames";
+  EXPECT_EQ(welded.pipeline.counters().weld_changes, 2u) << "vertices that came apart, not frames";
   EXPECT_EQ(vertices(0), 6u) << "what touches again is contact, not mesh";
   welded.pipeline.reset(StepStatus::DISABLED);
   EXPECT_EQ(vertices(0), 6u) << "references stay, too";
   welded.pipeline.reset(StepStatus::RESET);
   EXPECT_EQ(vertices(0), 4u) << "the first frame after a reset is a first frame";
-  EXPECT_EQ(welded.pipeline.weldChanges(), 2u);
+  EXPECT_EQ(welded.pipeline.counters().weld_changes, 2u);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "report/latency_histogram.h"
+#include "output/latency_histogram.h"
 
 #include <algorithm>
 #include <cmath>
@@ -30,15 +30,6 @@ double LatencyHistogram::quantile(double q) const {
     if (sum > 0 && static_cast<double>(sum) >= wanted) return std::min(upperEdge(bin), worst_s_);
   }
   return worst_s_;
-}
-
-std::vector<LatencyHistogram::Bin> LatencyHistogram::bins() const {
-  std::vector<Bin> filled;
-  for (std::size_t bin = 0; bin < BINS; ++bin) {
-    if (!filled.empty() || counts_[bin] > 0) filled.push_back({upperEdge(bin), counts_[bin]});
-  }
-  while (!filled.empty() && filled.back().count == 0) filled.pop_back();
-  return filled;
 }
 
 }  // namespace dccd

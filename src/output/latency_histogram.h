@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 namespace dccd {
 
@@ -16,18 +15,11 @@ class LatencyHistogram {
   static constexpr double LEAST_S = 1e-6;
   static constexpr std::size_t BINS = 9 * BINS_PER_DECADE;
 
-  struct Bin {
-    double upper_s;
-    std::uint64_t count;
-  };
-
   void add(double seconds);
   std::uint64_t count() const { return count_; }
   /// q in [0, 1]: the least edge that a share of q does not exceed. 0 when there is nothing.
   double quantile(double q) const;
   double worst() const { return worst_s_; }
-  /// From the first to the last bin that is not empty.
-  std::vector<Bin> bins() const;
 
  private:
   static double upperEdge(std::size_t bin);

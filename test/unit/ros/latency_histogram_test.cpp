@@ -1,9 +1,10 @@
-#include "report/latency_histogram.h"
+#include "output/latency_histogram.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -32,24 +33,20 @@ TEST(LatencyHistogram, QuantilesAreNeverTooSmallAndAtMostABinTooLarge) {
 TEST(LatencyHistogram, EdgesAndExtremes) {
   LatencyHistogram histogram;
   EXPECT_EQ(histogram.quantile(0.5), 0);
-  EXPECT_TRUE(histogram.bins().empty());
   for (const double s : {-1.0, 0.0, 1e-9, 1e-3, 1e9, std::numeric_limits<double>::infinity()}) histogram.add(s);
   histogram.add(std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(histogram.count(), 7u);
-  std::uint64_t sum = 0;
-  for (const auto& bin : histogram.bins()) sum += bin.count;
-  EXPECT_EQ(sum, 7u);
+  EXPECT_EQ(histogram.quantile(0), 1e-6 * std::pow(10, 0.05)) << "the first bin has what is below it";
   EXPECT_EQ(histogram.worst(), std::numeric_limits<double>::infinity());
 }
 
 TEST(LatencyHistogram, AnEdgeItselfBelongsBelowIt) {
-  LatencyHistogram all;
-  for (const double s : {LatencyHistogram::LEAST_S, 1e3}) all.add(s);
-  ASSERT_EQ(all.bins().size(), LatencyHistogram::BINS);
-  for (const LatencyHistogram::Bin& bin : all.bins()) {
-    LatencyHistogram one;
-    one.add(bin.upper_s);
-    EXPECT_EQ(one.bins().at(0).upper_s, bin.upper_s);
+  for (std::size_t bin = 0; bin < LatencyHistogram::BINS; ++bin) {
+    const double edge_s =
+        LatencyHistogram::LEAST_S * std::pow(10.0, static_cast<double>(bin + 1) / LatencyHistogram::BINS_PER_DECADE);
+    LatencyHistogram two;
+    for (const double s : {edge_s, 1e9}) two.add(s);
+    EXPECT_EQ(two.quantile(0.5), edge_s);
   }
 }
 
