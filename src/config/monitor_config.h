@@ -21,6 +21,7 @@
 namespace dccd {
 
 enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
+enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
 struct BodyConfig {
   Body body;
   std::string topic;         ///< streams and static meshes
@@ -96,6 +97,7 @@ struct MonitorConfig {
   double transform_timeout_s = 0.2;
   double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
+  QueuePolicy queue_policy = QueuePolicy::NEWEST;
   std::string simd_target = "auto";
   std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)

@@ -72,12 +72,17 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       recorder(config, pipeline.monitor(), private_node.getNamespace()),
       outputs(private_node, config),
       state(private_node, livenessLimits(config), config.speed_law),
-      queue(config.bodies.size(), config.queue_size, config.max_queue_bytes),
+      queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_queue_bytes),
       diagnostics(private_node.getNamespace()),
       diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),
       log(node, private_node.getNamespace(), config),
       look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
-      disabled_frames(config.bodies.size()) {}
+      disabled_frames(config.bodies.size()) {
+  // Of a static body the newest frame alone counts.
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (pipeline.isStatic(b)) queue.keepNewest(b);
+  }
+}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 

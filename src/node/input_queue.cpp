@@ -7,8 +7,8 @@
 
 namespace dccd {
 
-InputQueue::InputQueue(std::size_t bodies, std::size_t capacity, std::size_t max_bytes)
-    : queues_(bodies), dropped_(bodies, 0), capacity_(capacity), max_bytes_(max_bytes) {}
+InputQueue::InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy, std::size_t max_bytes)
+    : queues_(bodies), dropped_(bodies, 0), policies_(bodies, policy), capacity_(capacity), max_bytes_(max_bytes) {}
 
 void InputQueue::push(std::size_t body, MeshMessage message) {
   {
@@ -26,7 +26,7 @@ void InputQueue::push(std::size_t body, MeshMessage message) {
     while (isFull()) {
       ++dropped_[body];
       // What lies in other bodies' queues is theirs.
-      if (queue.empty()) return;
+      if (policies_[body] == QueuePolicy::OLDEST || queue.empty()) return;
       bytes_ -= queue.front().size();
       queue.pop_front();
     }

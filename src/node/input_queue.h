@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "config/monitor_config.h"
 #include "input/mesh_message.h"
 
 namespace dccd {
@@ -23,10 +24,12 @@ struct Reply {
 class InputQueue {
  public:
   /// `max_bytes`: of the messages of all bodies; 0: no limit.
-  InputQueue(std::size_t bodies, std::size_t capacity, std::size_t max_bytes = 0);
+  InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy, std::size_t max_bytes = 0);
 
-  /// A full queue drops its oldest messages and counts them; so does one for which there is no room in bytes beside the
-  /// others. One that has no room at all is kept without its content.
+  /// Before the first message: this body's newest message is never the one that is dropped.
+  void keepNewest(std::size_t body) { policies_[body] = QueuePolicy::NEWEST; }
+  /// A full queue drops its oldest messages (newest) or this one (oldest), and counts them; so does one for which there
+  /// is no room in bytes beside the others. One that has no room at all is kept without its content.
   void push(std::size_t body, MeshMessage message);
   /// False when the body has none.
   bool pop(std::size_t body, MeshMessage& message);
@@ -52,6 +55,7 @@ class InputQueue {
   std::condition_variable changed_;
   std::vector<std::deque<MeshMessage>> queues_;
   std::vector<std::uint64_t> dropped_;
+  std::vector<QueuePolicy> policies_;
   std::vector<std::function<void()>> commands_;
   std::size_t capacity_, max_bytes_, bytes_ = 0;
   bool woken_ = false, closed_ = false;

@@ -40,7 +40,7 @@ class LiveFuzzTest(AttackTest):
     def parameters(self):
         r = self.source.random
         chosen = {'max_memory_mb': LIMIT_MB, 'max_map_mb': LIMIT_MB, 'record_folder': self.folder, 'record_steps': r.choice([0, 1, 20]),
-                  'num_threads': r.choice([1, 2]), 'queue_size': r.choice([1, 8, 50]),
+                  'num_threads': r.choice([1, 2]), 'queue_policy': r.choice(['newest', 'oldest']), 'queue_size': r.choice([1, 8, 50]),
                   'effects/octomap': r.choice(['on', 'on', 'off']), 'octomap_topic': '/fuzz_map', 'look_ahead_s': r.choice([0.0, 0.1]),
                   'markers/mesh': r.choice(['true', 'false']), 'markers/obstacle_m': r.choice([0.0, 0.5]),
                   'fixed_frame': r.choice(['world', '']), 'transform_timeout_s': r.choice([0.0, 0.1]),

@@ -23,9 +23,9 @@ from live_node import Cloud, LiveNodeTest, resident_kb, simulated_time
 
 
 class NodeFaultsTest(LiveNodeTest):
-    def overload(self, name, size, factor):
+    def overload(self, name, policy, size, factor):
         """Frames at `factor` times the rate at which steps are done; returns the newest stamps and the last statistics."""
-        node = self.start_node(name, queue_size=size)
+        node = self.start_node(name, queue_size=size, queue_policy=policy)
         cloud = Cloud(24, 24, padding=152)  # 101 kB a frame
         for _ in range(6):
             self.step(cloud.message())
@@ -55,11 +55,16 @@ class NodeFaultsTest(LiveNodeTest):
             self.assertLess(memory_kb[-1], memory_kb[0] + 10000, 'memory grows: %s kB' % memory_kb)
         return cloud, last
 
-    def test_overload(self):
+    def test_overload_newest_first(self):
         for factor in (2, 10):
             with self.subTest(factor=factor):
-                cloud, last = self.overload('overload_%d' % factor, 3, factor)
+                cloud, last = self.overload('newest_%d' % factor, 'newest', 3, factor)
                 self.assertAlmostEqual(last.header.stamp.to_sec(), 100 + 0.01 * cloud.count, 6, 'the newest frame is answered')
+
+    def test_overload_oldest_first(self):
+        for factor in (2, 10):
+            with self.subTest(factor=factor):
+                self.overload('oldest_%d' % factor, 'oldest', 3, factor)  # which frames are kept: InputQueue's test
 
     def test_a_subscriber_that_never_reads(self):
         node = self.start_node('unread', queue_size=100)

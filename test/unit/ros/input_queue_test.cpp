@@ -9,8 +9,9 @@
 namespace dccd {
 namespace {
 
-TEST(InputQueue, AFullOneKeepsTheNewest) {
-  InputQueue queue(2, 2);
+/// Receipt times of what is left of four messages in a queue for two.
+std::vector<StampNs> leftOfFour(QueuePolicy policy) {
+  InputQueue queue(2, 2, policy);
   for (StampNs time = 1; time <= 4; ++time) {
     MeshMessage message;
     message.receipt_ns = time;
@@ -21,9 +22,13 @@ TEST(InputQueue, AFullOneKeepsTheNewest) {
   EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 0})) << "each is counted once";
   std::vector<StampNs> left;
   for (MeshMessage message; queue.pop(1, message);) left.push_back(message.receipt_ns);
-  EXPECT_EQ(left, (std::vector<StampNs>{3, 4}));
   EXPECT_EQ(queue.size(0), 0u) << "the other body's queue is its own";
+  return left;
 }
+
+TEST(InputQueue, NewestKeepsTheLast) { EXPECT_EQ(leftOfFour(QueuePolicy::NEWEST), (std::vector<StampNs>{3, 4})); }
+
+TEST(InputQueue, OldestKeepsTheFirst) { EXPECT_EQ(leftOfFour(QueuePolicy::OLDEST), (std::vector<StampNs>{1, 2})); }
 
 /// Bytes of what is left in two queues for 100 bytes in all, and how many were dropped of each.
 TEST(InputQueue, BytesAreBoundedOverAllBodies) {
@@ -32,31 +37,34 @@ TEST(InputQueue, BytesAreBoundedOverAllBodies) {
     m.bytes.resize(bytes);
     return m;
   };
-  InputQueue queue(2, 64, 100);
-  queue.push(0, message(40));
-  for (const std::size_t bytes : {20, 30, 25}) queue.push(1, message(bytes));
-  EXPECT_EQ(queue.size(0), 1u) << "nobody's messages make room for another body's";
-  MeshMessage last, first;
-  ASSERT_TRUE(queue.pop(1, first));
-  ASSERT_TRUE(queue.pop(1, last));
-  EXPECT_EQ(first.bytes.size(), 30u);
-  EXPECT_EQ(last.bytes.size(), 25u);
-  EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 1}));
-  queue.push(1, message(61));
-  EXPECT_EQ(queue.size(1), 0u) << "beside what the other body has there is no room for it";
-  queue.clear();
-  queue.push(1, message(100));
-  EXPECT_EQ(queue.size(1), 1u) << "what was popped or cleared has left its room";
-  EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 1}));
-  queue.push(1, message(101));
-  ASSERT_TRUE(queue.pop(1, first));
-  ASSERT_TRUE(queue.pop(1, last)) << "what never finds room keeps its turn, to be refused in words";
-  EXPECT_EQ(last.too_large, 101u);
-  EXPECT_TRUE(last.bytes.empty());
+  for (const QueuePolicy policy : {QueuePolicy::NEWEST, QueuePolicy::OLDEST}) {
+    InputQueue queue(2, 64, policy, 100);
+    queue.push(0, message(40));
+    for (const std::size_t bytes : {20, 30, 25}) queue.push(1, message(bytes));
+    EXPECT_EQ(queue.size(0), 1u) << "nobody's messages make room for another body's";
+    MeshMessage last, first;
+    ASSERT_TRUE(queue.pop(1, first));
+    ASSERT_TRUE(queue.pop(1, last));
+    const bool newest = policy == QueuePolicy::NEWEST;
+    EXPECT_EQ(first.bytes.size(), newest ? 30u : 20u);
+    EXPECT_EQ(last.bytes.size(), newest ? 25u : 30u);
+    EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 1}));
+    queue.push(1, message(61));
+    EXPECT_EQ(queue.size(1), 0u) << "beside what the other body has there is no room for it";
+    queue.clear();
+    queue.push(1, message(100));
+    EXPECT_EQ(queue.size(1), 1u) << "what was popped or cleared has left its room";
+    EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 1}));
+    queue.push(1, message(101));
+    ASSERT_TRUE(queue.pop(1, first));
+    ASSERT_TRUE(queue.pop(1, last)) << "what never finds room keeps its turn, to be refused in words";
+    EXPECT_EQ(last.too_large, 101u);
+    EXPECT_TRUE(last.bytes.empty());
+  }
 }
 
 TEST(InputQueue, ClearSaysWhatItDropped) {
-  InputQueue queue(2, 3);
+  InputQueue queue(2, 3, QueuePolicy::NEWEST);
   queue.push(0, {});
   queue.push(0, {});
   EXPECT_EQ(queue.clear(), (std::vector<std::uint64_t>{2, 0}));
@@ -66,7 +74,7 @@ TEST(InputQueue, ClearSaysWhatItDropped) {
 }
 
 TEST(InputQueue, ClearSparesWhatItIsTold) {
-  InputQueue queue(3, 3);
+  InputQueue queue(3, 3, QueuePolicy::NEWEST);
   for (std::size_t body = 0; body < 3; ++body) queue.push(body, {});
   EXPECT_EQ(queue.clear({false, true, false}), (std::vector<std::uint64_t>{1, 0, 1}));
   EXPECT_EQ(queue.size(0) + queue.size(2), 0u);
@@ -79,7 +87,7 @@ void serve(InputQueue& queue) {
 }
 
 TEST(InputQueue, ACallIsAnsweredByTheWorkerAlsoWhenItThrows) {
-  InputQueue queue(1, 1);
+  InputQueue queue(1, 1, QueuePolicy::NEWEST);
   std::thread worker([&] {
     serve(queue);
     serve(queue);
@@ -94,7 +102,7 @@ TEST(InputQueue, ACallIsAnsweredByTheWorkerAlsoWhenItThrows) {
 }
 
 TEST(InputQueue, ACallThatTimesOutIsDoneLaterAndSaysSo) {
-  InputQueue queue(1, 1);
+  InputQueue queue(1, 1, QueuePolicy::NEWEST);
   bool done = false;
   const Reply reply = queue.call(
       [&] {
@@ -110,7 +118,7 @@ TEST(InputQueue, ACallThatTimesOutIsDoneLaterAndSaysSo) {
 }
 
 TEST(InputQueue, ClosingEndsCallsAtOnce) {
-  InputQueue queue(1, 1);
+  InputQueue queue(1, 1, QueuePolicy::NEWEST);
   Reply reply{true, ""};
   const auto start = std::chrono::steady_clock::now();
   std::thread caller([&] { reply = queue.call([] { return Reply{true, "done"}; }, 30); });

@@ -17,7 +17,6 @@ TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
       {"topology: {rwos: 3}", "~topology/rwos is not known; nearest is ~topology/rows"},
       {"record_stesp: 3", "~record_stesp is not known; nearest is ~record_steps"},
       {"record_directory: steps", "~record_directory is not known; nearest is ~record_folder"},
-      {"queue_policy: newest", "~queue_policy is gone: a full queue drops its oldest frames; remove it"},
       {"sensor_model: {mis: 0.3}", "~sensor_model/mis is not known; nearest is ~sensor_model/min"},
       {"clearance: {max: 1.0}", "~clearance/max is not known; nearest is ~clearance/max_m"},
   });
