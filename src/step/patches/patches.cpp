@@ -49,7 +49,7 @@ const char* toString(PatchEventKind kind) {
   return NAMES[static_cast<std::size_t>(kind)];
 }
 
-void PatchMaker::begin(Outcome& outcome) {
+void PatchMaker::begin(const TouchGraph::Parallel& parallel, Outcome& outcome) {
   const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
   empty(first_of_, newest_part_, parts_, stretches_, by_patch_, spots_, leaves_);
   graph_.clear();
@@ -57,11 +57,11 @@ void PatchMaker::begin(Outcome& outcome) {
   const std::vector<Contact>& contacts = outcome.contacts;
   const std::vector<StartIntersection>& met = outcome.intersections;
   contacts_ = contacts.size();
-  graph_.add(contacts.data(), contacts.data() + contacts.size());
+  graph_.add(contacts.data(), contacts.data() + contacts.size(), parallel);
   // They come first: a vertex inside of the map is a contact as well, and a body inside of another touches nothing.
   const auto crosses = [](const StartIntersection& one) { return one.vertex[4] != NO_INDEX; };
-  graph_.add(met.data(), met.data() + (std::partition_point(met.begin(), met.end(), crosses) - met.begin()));
-  graph_.findPatches();
+  graph_.add(met.data(), std::partition_point(met.data(), met.data() + met.size(), crosses), parallel);
+  graph_.findPatches(parallel);
   outcome.patches.resize(graph_.patchCount());
   outcome.patch_of.resize(contacts_);
   graph_.forEach([&](const TouchGroup& group, std::uint32_t first, std::uint32_t last, std::uint32_t patch) {
@@ -258,7 +258,7 @@ void PatchMaker::findSpots() {
     if (stretch.patch != patch) some_expected = false;
     patch = stretch.patch;
     const TouchGroup& group = *stretch.group;
-    const auto add = [&](auto size) {
+    withSize(group.size(), [&](auto size) {
       const Index* vertices = graph_.verticesOf(group, stretch.first);
       for (std::uint32_t t = stretch.first; t < stretch.last; ++t, vertices += size) {
         std::uint32_t other = some_expected;
@@ -268,14 +268,7 @@ void PatchMaker::findSpots() {
         addSpots(stretch, vertices, expected);
         some_expected |= expected;
       }
-    };
-    if (group.size() == 4) {
-      add(std::integral_constant<int, 4>());
-    } else if (group.size() == 5) {
-      add(std::integral_constant<int, 5>());
-    } else {
-      add(group.size());
-    }
+    });
   }
 }
 
