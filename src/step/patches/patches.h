@@ -82,8 +82,11 @@ class PatchMaker {
   Place placeOf(const Outcome& outcome, const Contact& contact) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void measure(const Outcome& outcome, std::size_t piece);
-  void addContact(const Outcome& outcome, std::size_t c, const Vec3& point, const Vec3& normal, Part& part) const;
-  void addCrossing(const Outcome& outcome, const StartIntersection& crossing, Part& part) const;
+  template <class PlaceOf>
+  void addContacts(const Outcome& outcome, std::size_t first, std::size_t last, const PlaceOf& placeOf,
+                   Part& part) const;
+  void addCrossings(const Outcome& outcome, const StartIntersection* first, const StartIntersection* last,
+                    Part& part) const;
   void findAreas(const Outcome& outcome);
   void findSpots();
   void addSpots(const Stretch& stretch, const Index* vertices, bool expected);

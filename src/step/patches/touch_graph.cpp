@@ -57,6 +57,12 @@ const T* endOfAlike(const T* first, const T* last) {
   return std::find_if(first, last, [&](const T& one) { return one.body != first->body; });
 }
 
+/// Where there is one piece alone, which most steps have, nothing is made for threads.
+template <class F>
+void inPieces(const TouchGraph::Parallel& parallel, std::size_t n, std::size_t piece, const F& f) {
+  n <= piece ? f(0, n) : parallel(n, piece, std::cref(f));
+}
+
 }  // namespace
 
 /// Several threads mark the same vertices, most of them often: only what is not marked yet takes memory from another.
@@ -76,7 +82,7 @@ void TouchGraph::add(const T* first, const T* last, const Parallel& parallel) {
     const auto alike = static_cast<std::uint32_t>(end - at);
     const TouchGroup& group =
         groups_.emplace_back(TouchGroup{at->body, sizesOf(*at), touch_count_, touch_count_ + alike, vertices_used_});
-    parallel(alike, PIECE, [&](std::size_t from, std::size_t to) {
+    inPieces(parallel, alike, PIECE, [&](std::size_t from, std::size_t to) {
       take(group, group.first + static_cast<std::uint32_t>(from), group.first + static_cast<std::uint32_t>(to),
            at + from);
     });
@@ -193,7 +199,7 @@ void TouchGraph::nameComponents(std::size_t first, std::size_t last, const Paral
     const TouchGroup& group = groups_[by_partners_[g]];
     const std::size_t pieces = (group.last - group.first + PIECE - 1) / PIECE;
     if (changes_.size() < pieces) changes_.resize(pieces);
-    parallel(pieces, 1, [&](std::size_t from, std::size_t to) {
+    inPieces(parallel, pieces, 1, [&](std::size_t from, std::size_t to) {
       for (std::size_t p = from; p < to; ++p) {
         const std::uint32_t begin = group.first + static_cast<std::uint32_t>(p) * PIECE;
         findChanges(group, begin, std::min(begin + PIECE, group.last), changes_[p]);
