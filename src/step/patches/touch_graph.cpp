@@ -39,7 +39,7 @@ void TouchGraph::setBodies(const std::vector<Body>& bodies) {
 namespace {
 
 constexpr std::ptrdiff_t AHEAD = 32;   // touches that are fetched from memory
-constexpr std::uint32_t PIECE = 8192;  // of the touches of a group that a thread takes at once
+constexpr std::uint32_t PIECE = 4096;  // of the touches of a group that a thread takes at once
 
 std::array<std::uint8_t, 2> sizesOf(const Contact& contact) { return factsOf(contact.kind).vertices; }
 std::array<std::uint8_t, 2> sizesOf(const StartIntersection&) { return {2, 3}; }
@@ -63,13 +63,12 @@ void inPieces(const TouchGraph::Parallel& parallel, std::size_t n, std::size_t p
   n <= piece ? f(0, n) : parallel(n, piece, std::cref(f));
 }
 
-}  // namespace
-
 /// Several threads mark the same vertices, most of them often: only what is not marked yet takes memory from another.
-inline void TouchGraph::mark(Index vertex) {
-  std::uint8_t* const at = &is_touched_[vertex];
-  if (!__atomic_load_n(at, __ATOMIC_RELAXED)) __atomic_store_n(at, true, __ATOMIC_RELAXED);
+inline void mark(std::uint8_t& is_touched) {
+  if (!__atomic_load_n(&is_touched, __ATOMIC_RELAXED)) __atomic_store_n(&is_touched, true, __ATOMIC_RELAXED);
 }
+
+}  // namespace
 
 template <class T>
 void TouchGraph::add(const T* first, const T* last, const Parallel& parallel) {
@@ -97,19 +96,23 @@ template void TouchGraph::add(const Spot*, const Spot*, const Parallel&);
 /// The vertices of a group's touches from first to last.
 template <class T>
 void TouchGraph::take(const TouchGroup& group, std::uint32_t first, std::uint32_t last, const T* touch) {
-  const bool marks = group.partners() == groups_.front().partners();
   withSize(group.size(), [&](auto size) {
-    std::array<Index, size> base{}, vertex;
+    // What bytes are written to is no part of the loop.
+    std::uint8_t* const touched = group.partners() == groups_.front().partners() ? is_touched_.data() : nullptr;
+    std::uint8_t* expected = expected_.data() + first;
+    Index* out = vertices_.data() + group.vertices + (first - group.first) * std::size_t{size};
+    std::array<Index, size> base{};
     for (int i = 0; !std::is_same_v<T, Spot> && i < size; ++i) {
       base[i] = vertex_begin_[group.body[i >= group.sizes[0]]];
     }
-    Index* out = vertices_.data() + group.vertices + (first - group.first) * std::size_t{size};
-    for (std::uint32_t t = first; t < last; ++t, ++touch, out += size) {
-      __builtin_prefetch(touch + AHEAD);
-      for (int i = 0; i < size; ++i) vertex[i] = base[i] + touch->vertex[i];
-      std::copy(vertex.begin(), vertex.end(), out);
-      expected_[t] = touch->expected;
-      for (int i = 0; marks && i < size; ++i) mark(vertex[i]);
+    for (const T *at = touch, *const end = touch + (last - first); at != end; ++at, out += size) {
+      __builtin_prefetch(at + AHEAD);
+      for (int i = 0; i < size; ++i) {
+        const Index vertex = base[i] + at->vertex[i];
+        out[i] = vertex;
+        if (touched) mark(touched[vertex]);
+      }
+      *expected++ = at->expected;
     }
   });
 }
@@ -176,11 +179,11 @@ void TouchGraph::findAreasOf(std::size_t body) {
 void TouchGraph::findChanges(const TouchGroup& group, std::uint32_t first, std::uint32_t last,
                              std::vector<Change>& changes) const {
   changes.clear();
-  const Index* vertex = verticesOf(group, first);
-  const int second = group.onMap() ? 0 : group.sizes[0];
+  const Index *vertex = verticesOf(group, first), *const area = area_.data();
+  const int size = group.size(), second = group.onMap() ? 0 : group.sizes[0];
   std::array<Index, 2> areas{NO_INDEX, NO_INDEX};
-  for (std::uint32_t t = first; t < last; ++t, vertex += group.size()) {
-    const Index one = area_[vertex[0]], other = area_[vertex[second]];
+  for (std::uint32_t t = first; t < last; ++t, vertex += size) {
+    const Index one = area[vertex[0]], other = area[vertex[second]];
     if (one == areas[0] && other == areas[1]) continue;
     areas = {one, other};
     changes.push_back({t, areas});

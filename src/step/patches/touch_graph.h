@@ -101,7 +101,6 @@ class TouchGraph {
 
   template <class T>
   void take(const TouchGroup& group, std::uint32_t first, std::uint32_t last, const T* touch);
-  void mark(Index vertex);
   void findAreas(std::size_t first, std::size_t last);
   void findAreasOf(std::size_t body);
   Index areaRoot(Index vertex);
