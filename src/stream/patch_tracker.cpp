@@ -389,11 +389,8 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
     TouchGraph::Spot& spot = all_.spots[i];
     Known& known = all_.known[i];
     const std::int64_t clock_ns = spot.body[1] == OBSTACLE_BODY ? map_clock_ns_ : mesh_clock_ns_;
-    if (current_[i] != NO_PATCH) {
-      known.last_ns = clock_ns;
-    } else if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) {
-      continue;
-    }
+    if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
+    if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) continue;
     Part& part = parts_[part_of_[i]];
     if (part.touches) {
       known.id = part.id;
@@ -404,11 +401,8 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
       if (alive_.empty() || alive_.back() != known.id) alive_.push_back(known.id);
       if (!spot.expected) living_.at(known.id).unexpected = true;
     }
-    if (kept < i) {
-      all_.spots[kept] = spot;
-      all_.known[kept] = known;
-    }
-    ++kept;
+    all_.spots[kept] = spot;
+    all_.known[kept++] = known;
   }
   all_.resize(kept);
   std::swap(all_, trace_);

@@ -97,7 +97,7 @@ template void TouchGraph::add(const Spot*, const Spot*, const Parallel&);
 template <class T>
 void TouchGraph::take(const TouchGroup& group, std::uint32_t first, std::uint32_t last, const T* touch) {
   withSize(group.size(), [&](auto size) {
-    // What bytes are written to is no part of the loop.
+    // Pointers of the loop's own: after each byte that it writes members would be read anew.
     std::uint8_t* const touched = group.partners() == groups_.front().partners() ? is_touched_.data() : nullptr;
     std::uint8_t* expected = expected_.data() + first;
     Index* out = vertices_.data() + group.vertices + (first - group.first) * std::size_t{size};
@@ -122,7 +122,7 @@ void TouchGraph::clear() {
   const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
   empty(groups_, by_partners_, runs_, runs_of_, number_);
   changes_.resize(std::min<std::size_t>(changes_.size(), touch_count_ / PIECE + 1));
-  std::fill(is_touched_.begin(), is_touched_.end(), false);
+  std::fill(is_touched_.begin(), is_touched_.end(), false);  // by touches that were added in vain, too
   const auto shorten = [](auto& buffer, std::size_t used) {
     if (buffer.size() > KEPT_FOR_USE * used) buffer.resize(used);
     releaseBurst(buffer, used);
