@@ -49,7 +49,7 @@ const char* toString(PatchEventKind kind) {
   return NAMES[static_cast<std::size_t>(kind)];
 }
 
-void PatchMaker::begin(Outcome& outcome) {
+void PatchMaker::begin(const TouchGraph::Parallel& parallel, Outcome& outcome) {
   const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
   empty(first_of_, newest_part_, parts_, stretches_, by_patch_, spots_, leaves_);
   graph_.clear();
@@ -57,11 +57,11 @@ void PatchMaker::begin(Outcome& outcome) {
   const std::vector<Contact>& contacts = outcome.contacts;
   const std::vector<StartIntersection>& met = outcome.intersections;
   contacts_ = contacts.size();
-  graph_.add(contacts.data(), contacts.data() + contacts.size());
+  graph_.add(contacts.data(), contacts.data() + contacts.size(), parallel);
   // They come first: a vertex inside of the map is a contact as well, and a body inside of another touches nothing.
   const auto crosses = [](const StartIntersection& one) { return one.vertex[4] != NO_INDEX; };
-  graph_.add(met.data(), met.data() + (std::partition_point(met.begin(), met.end(), crosses) - met.begin()));
-  graph_.findPatches();
+  graph_.add(met.data(), std::partition_point(met.data(), met.data() + met.size(), crosses), parallel);
+  graph_.findPatches(parallel);
   outcome.patches.resize(graph_.patchCount());
   outcome.patch_of.resize(contacts_);
   graph_.forEach([&](const TouchGroup& group, std::uint32_t first, std::uint32_t last, std::uint32_t patch) {
@@ -122,64 +122,91 @@ PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& 
   return {turn * (point - map_from_fixed.translation()), turn * normal};
 }
 
-inline void PatchMaker::addContact(const Outcome& outcome, std::size_t c, const Vec3& point, const Vec3& normal,
-                                   Part& part) const {
-  const Contact& contact = outcome.contacts[c];
+/// placeOf(contact): the Place of one.
+template <class PlaceOf>
+void PatchMaker::addContacts(const Outcome& outcome, std::size_t first, std::size_t last, const PlaceOf& placeOf,
+                             Part& part) const {
+  const std::vector<Contact>& contacts = outcome.contacts;
   // Of a body with itself neither side is the first: all are turned to the side of the first one.
-  const bool self = contact.body[0] == contact.body[1];
+  const auto [one, other] = contacts[first].body;
+  const bool self = one == other;
   if (part.contacts == 0) {
-    part.earliest = static_cast<std::uint32_t>(c);
-    const std::size_t first = first_of_[part.patch];
-    if (self) part.first_normal = first == c ? normal : normalOf(outcome, outcome.contacts[first]);
+    part.earliest = static_cast<std::uint32_t>(first);
+    const std::size_t of_patch = first_of_[part.patch];
+    if (self) part.first_normal = of_patch == first ? placeOf(first).normal : normalOf(outcome, contacts[of_patch]);
   }
-  part.expected += contact.expected;
-  if (!contact.expected) (contact.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
-  part.points += point;
-  part.box.min = part.box.min.cwiseMin(point);
-  part.box.max = part.box.max.cwiseMax(point);
-  // Which way is not foreseeable: no branch. The sum is never -0.
-  const double side = self ? part.first_normal.dot(normal) + 0.0 : contact.body[0] > contact.body[1] ? -1 : 1;
-  part.normals += std::copysign(1.0, side) * normal;
-  if (isEarlier(contact, outcome.contacts[part.earliest])) part.earliest = static_cast<std::uint32_t>(c);
-  ++part.contacts;
-  part.certain += contact.certainty == Certainty::CERTAIN;
-  part.initial += contact.initial;
-  part.toc_lower = std::min(part.toc_lower, contact.toc_lower);
-  part.toc_upper = std::min(part.toc_upper, contact.toc_upper);
+  part.contacts += static_cast<std::uint32_t>(last - first);
+  Part sum = part;  // in registers
+  for (std::size_t c = first; c < last; ++c) {
+    const Contact& contact = contacts[c];
+    const Place at = placeOf(c);
+    // Which way is not foreseeable: no branch. The sum is never -0.
+    const double side = self ? sum.first_normal.dot(at.normal) + 0.0 : one > other ? -1 : 1;
+    const double turned = std::copysign(1.0, side);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = at.point[axis];
+      sum.points[axis] += x;
+      sum.box.min[axis] = std::min(sum.box.min[axis], x);
+      sum.box.max[axis] = std::max(sum.box.max[axis], x);
+      sum.normals[axis] += turned * at.normal[axis];
+    }
+    if (isEarlier(contact, contacts[sum.earliest])) sum.earliest = static_cast<std::uint32_t>(c);
+    sum.toc_lower = std::min(sum.toc_lower, contact.toc_lower);
+    sum.toc_upper = std::min(sum.toc_upper, contact.toc_upper);
+    sum.certain += contact.certainty == Certainty::CERTAIN;
+    sum.initial += contact.initial;
+    sum.expected += contact.expected;
+    if (!contact.expected) (contact.initial ? sum.unexpected.is_initial : sum.unexpected.is_new) = true;
+  }
+  part = sum;
 }
 
 void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
   const std::size_t first = piece * PIECE, last = std::min(touchCount(), first + PIECE);
   const auto is_before = [](const Stretch& stretch, std::size_t touch) { return stretch.first < touch; };
   auto stretch = std::lower_bound(stretches_.begin(), stretches_.end(), first, is_before);
-  const auto partOf = [&](std::size_t touch) -> Part& {
-    while (stretch->last <= touch) ++stretch;
-    return parts_[stretch->part];
+  const auto forParts = [&](std::size_t from, std::size_t to, const auto& add) {
+    for (std::size_t end; from < to; from = end) {
+      while (stretch->last <= from) ++stretch;
+      end = std::min<std::size_t>(stretch->last, to);
+      add(from, end, parts_[stretch->part]);
+    }
   };
-  const auto use = [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
-    addContact(outcome, c, laneOf(block.point, lane), laneOf(block.normal, lane), partOf(c));
+  const auto addPlaces = [&](std::size_t from, std::size_t to, const auto& placeOf) {
+    forParts(from, to, [&](std::size_t f, std::size_t l, Part& part) { addContacts(outcome, f, l, placeOf, part); });
+  };
+  const auto use = [&](std::size_t c, std::size_t count, const simd::TouchBlock& block) {
+    addPlaces(c, c + count, [&](std::size_t i) -> Place {
+      return {laneOf(block.point, i - c), laneOf(block.normal, i - c)};
+    });
   };
   const auto other = [&](std::size_t c) {
-    const Place at = placeOf(outcome, outcome.contacts[c]);
-    addContact(outcome, c, at.point, at.normal, partOf(c));
+    addPlaces(c, c + 1, [&](std::size_t i) { return placeOf(outcome, outcome.contacts[i]); });
   };
   inLanes<true>(outcome, first, std::min(last, contacts_), simd::touchPlaces, use, other);
-  for (std::size_t t = std::max(first, contacts_); t < last; ++t) {
-    addCrossing(outcome, outcome.intersections[t - contacts_], partOf(t));
-  }
+  forParts(std::max(first, contacts_), last, [&](std::size_t from, std::size_t to, Part& part) {
+    const StartIntersection* const crossings = outcome.intersections.data() - contacts_;
+    addCrossings(outcome, crossings + from, crossings + to, part);
+  });
 }
 
-void PatchMaker::addCrossing(const Outcome& outcome, const StartIntersection& crossing, Part& part) const {
-  part.expected += crossing.expected;
-  if (!crossing.expected) part.unexpected.is_initial = true;
-  ++part.crossings;
+void PatchMaker::addCrossings(const Outcome& outcome, const StartIntersection* first, const StartIntersection* last,
+                              Part& part) const {
+  const auto count = static_cast<std::uint32_t>(last - first);
+  const auto expected = static_cast<std::uint32_t>(
+      std::count_if(first, last, [](const StartIntersection& crossing) { return crossing.expected; }));
+  part.expected += expected;
+  part.unexpected.is_initial |= expected < count;
+  part.crossings += count;
   part.toc_lower = part.toc_upper = 0;
   if (first_of_[part.patch] < contacts_) return;  // crossings say where the patch is only if nothing else does
-  const auto at = [&](int i) { return (*outcome.step->bodies[crossing.body[i < 2 ? 0 : 1]].t0)[crossing.vertex[i]]; };
-  const Vec3 f0 = at(2), f1 = at(3), f2 = at(4), point = throughPlane(at(0), at(1), f0, (f1 - f0).cross(f2 - f0));
-  part.points += point;
-  part.box.min = part.box.min.cwiseMin(point);
-  part.box.max = part.box.max.cwiseMax(point);
+  for (; first != last; ++first) {
+    const auto at = [&](int i) { return (*outcome.step->bodies[first->body[i < 2 ? 0 : 1]].t0)[first->vertex[i]]; };
+    const Vec3 f0 = at(2), f1 = at(3), f2 = at(4), point = throughPlane(at(0), at(1), f0, (f1 - f0).cross(f2 - f0));
+    part.points += point;
+    part.box.min = part.box.min.cwiseMin(point);
+    part.box.max = part.box.max.cwiseMax(point);
+  }
 }
 
 void PatchMaker::make(Outcome& outcome) {
@@ -258,7 +285,7 @@ void PatchMaker::findSpots() {
     if (stretch.patch != patch) some_expected = false;
     patch = stretch.patch;
     const TouchGroup& group = *stretch.group;
-    const auto add = [&](auto size) {
+    withSize(group.size(), [&](auto size) {
       const Index* vertices = graph_.verticesOf(group, stretch.first);
       for (std::uint32_t t = stretch.first; t < stretch.last; ++t, vertices += size) {
         std::uint32_t other = some_expected;
@@ -268,14 +295,7 @@ void PatchMaker::findSpots() {
         addSpots(stretch, vertices, expected);
         some_expected |= expected;
       }
-    };
-    if (group.size() == 4) {
-      add(std::integral_constant<int, 4>());
-    } else if (group.size() == 5) {
-      add(std::integral_constant<int, 5>());
-    } else {
-      add(group.size());
-    }
+    });
   }
 }
 

@@ -38,7 +38,7 @@ class PatchMaker {
   /// made, and to which of them each contact belongs; parallel(n, piece, f) calls f(first, last) over [0, n).
   template <class Parallel>
   void run(const Parallel& parallel, Outcome& outcome) {
-    begin(outcome);
+    begin(std::cref(parallel), outcome);
     const std::size_t touches = touchCount(), pieces = (touches + PIECE - 1) / PIECE;
     if (touches == 0) return;
     // The first piece of work is of another kind, and as long as several of the others. Few are not worth a thread.
@@ -78,12 +78,15 @@ class PatchMaker {
     std::uint32_t first, last, patch, part;
   };
 
-  void begin(Outcome& outcome);
+  void begin(const TouchGraph::Parallel& parallel, Outcome& outcome);
   Place placeOf(const Outcome& outcome, const Contact& contact) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void measure(const Outcome& outcome, std::size_t piece);
-  void addContact(const Outcome& outcome, std::size_t c, const Vec3& point, const Vec3& normal, Part& part) const;
-  void addCrossing(const Outcome& outcome, const StartIntersection& crossing, Part& part) const;
+  template <class PlaceOf>
+  void addContacts(const Outcome& outcome, std::size_t first, std::size_t last, const PlaceOf& placeOf,
+                   Part& part) const;
+  void addCrossings(const Outcome& outcome, const StartIntersection* first, const StartIntersection* last,
+                    Part& part) const;
   void findAreas(const Outcome& outcome);
   void findSpots();
   void addSpots(const Stretch& stretch, const Index* vertices, bool expected);

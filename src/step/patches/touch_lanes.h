@@ -14,9 +14,9 @@ namespace dccd {
 constexpr std::size_t CONTACTS_AHEAD = 16;  ///< whose vertices are fetched from memory
 
 /// Of outcome.contacts from first to last, in their order: kernel(edge_edge, count, block) takes a block of lanes, then
-/// use(contact, block, lane) each of them; other(contact) those with the map and, where the step is cut into parts,
-/// all. contact: its place in the list. PLACES: the kernel is simd::touchPlaces, which is spared the ends that it does
-/// not use.
+/// use(contact, count, block) with the first of them; other(contact) those with the map and, where the step is cut into
+/// parts, all. contact: its place in the list. PLACES: the kernel is simd::touchPlaces, which is spared the ends that
+/// it does not use.
 template <bool PLACES, class Kernel, class Use, class Other>
 void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const Kernel& kernel, const Use& use,
              const Other& other) {
@@ -66,7 +66,8 @@ void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const 
       return count;
     };
     const std::size_t count = contacts->kind == PairKind::EDGE_EDGE ? fill(std::true_type()) : fill(std::false_type());
-    for (std::size_t lane = 0; lane < count; ++lane) use(c++, block, lane);
+    use(c, count, block);
+    c += count;
   }
 }
 
