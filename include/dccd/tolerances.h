@@ -76,8 +76,7 @@ constexpr float FUSED_LARGEST_M = 1073741824.0f;  ///< [m] guard, 2^30: cubes of
 // No fold (culling/unfolded.cpp).
 DCCD_MARGIN double UNFOLDED_COORDINATE = 0x1p-51;  ///< [1] margin of a projected coordinate, of the largest |x|+|y|+|z|
 constexpr double UNFOLDED_PRODUCT = 20;  ///< [1] slack of a difference of two products, times error (extent + error)
-constexpr double UNFOLDED_SMALLEST_NORMAL = 1e-200, UNFOLDED_LARGEST_NORMAL = 1e200;  ///< [m^2] guard
-constexpr double UNFOLDED_SMALLEST_M = 1e-100, UNFOLDED_LARGEST_M = 1e100;            ///< [m] guard
+constexpr double UNFOLDED_SMALLEST_M = 1e-100, UNFOLDED_LARGEST_M = 1e100;  ///< [m] guard
 // Start state (step/start/segment_triangle.cpp), in double.
 DCCD_MARGIN double SEGMENT_PROJECTED = 35 * HALF_ULP;  ///< [1] margin of a cross product's component, times M^2
 DCCD_MARGIN double SEGMENT_LINE = 47 * HALF_ULP;       ///< [1] of where a line meets a face, times M^3
