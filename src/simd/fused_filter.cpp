@@ -80,7 +80,8 @@ HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const
 constexpr size_t BLOCK_SIZE = 6 * 4 * MAX_LANES;
 
 // Differences of one pair to its origin point, rounded once in double and once to float. A block is laid out as
-// [time][point][lane][4]; with AVX-512, where one vector holds both times, as [point][lane][time][4].
+// [time][point][lane][4]; with AVX-512, where one vector holds both times, as [point][lane][time][4], each lane of the
+// first half beside the one eight further on.
 template <bool EDGE_EDGE>
 HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
                        float* HWY_RESTRICT block) {
@@ -91,8 +92,8 @@ HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_
     const auto origin = hn::Load(dd, o + k);
     for (size_t i = 0; i < 3; ++i) {
       const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
-      float* to =
-          DCCD_AVX512 ? block + (i * MAX_LANES + lane) * 8 : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
+      float* to = DCCD_AVX512 ? block + (i * MAX_LANES + lane % 8 * 2 + lane / 8) * 8
+                              : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
       hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, v + k), origin)), df, to);
     }
   }
@@ -101,14 +102,31 @@ HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_
 // Of point i, at t0 and t1.
 HWY_INLINE void loadPoint(const float* HWY_RESTRICT block, size_t i, Vec3V& p0, Vec3V& p1) {
   const DF d;
-  VF unused;
 #if DCCD_AVX512
-  Vec3V low, high;  // the first half of the lanes, each at t0 and t1, and the other half
-  hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES, low.x, low.y, low.z, unused);
-  hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES + 4 * MAX_LANES, high.x, high.y, high.z, unused);
-  p0 = {hn::ConcatEven(d, high.x, low.x), hn::ConcatEven(d, high.y, low.y), hn::ConcatEven(d, high.z, low.z)};
-  p1 = {hn::ConcatOdd(d, high.x, low.x), hn::ConcatOdd(d, high.y, low.y), hn::ConcatOdd(d, high.z, low.z)};
+  const hn::RepartitionToWide<DF> two;  // a pair of lanes moves as one number
+  VF xy[4], z[4];                       // of two lanes each
+  for (size_t k = 0; k < 4; ++k) {
+    const VF one = hn::Load(d, block + (i * 8 + 2 * k) * MAX_LANES);
+    const VF other = hn::Load(d, block + (i * 8 + 2 * k + 1) * MAX_LANES);
+    xy[k] = hn::InterleaveLower(d, one, other);
+    z[k] = hn::InterleaveUpper(d, one, other);
+  }
+  // A coordinate, four lanes a block of 128 bits: at t0, at t1, and both of the lanes eight further on.
+  const auto split = [d](VF first, VF second, VF& at_t0, VF& at_t1) HWY_ATTR {
+    at_t0 = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(second), first);
+    at_t1 = hn::OddEvenBlocks(second, hn::SwapAdjacentBlocks(first));
+  };
+  const auto lower = [&](const VF* v) HWY_ATTR {
+    return hn::BitCast(d, hn::InterleaveLower(two, hn::BitCast(two, v[0]), hn::BitCast(two, v[1])));
+  };
+  const auto upper = [&](const VF* v) HWY_ATTR {
+    return hn::BitCast(d, hn::InterleaveUpper(two, hn::BitCast(two, v[0]), hn::BitCast(two, v[1])));
+  };
+  split(lower(xy), lower(xy + 2), p0.x, p1.x);
+  split(upper(xy), upper(xy + 2), p0.y, p1.y);
+  split(lower(z), lower(z + 2), p0.z, p1.z);
 #else
+  VF unused;
   hn::LoadInterleaved4(d, block + i * 4 * MAX_LANES, p0.x, p0.y, p0.z, unused);
   hn::LoadInterleaved4(d, block + (3 + i) * 4 * MAX_LANES, p1.x, p1.y, p1.z, unused);
 #endif
