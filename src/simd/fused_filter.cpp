@@ -47,19 +47,51 @@ HWY_INLINE Quadratic cross(const Vec3V& a0, const Vec3V& a1, const Vec3V& b0, co
 }
 HWY_INLINE Quadratic operator+(const Quadratic& p, const Quadratic& q) { return {p.A + q.A, p.B + q.B, p.C + q.C}; }
 
-// Smallest and largest coefficient of one scalar quadratic.
+// What is asked of the coefficients of one scalar quadratic: are all above a positive bound, or all below a negative
+// one? The smallest and the largest tell. With AVX-512 the bits of the numbers are compared as integers, which units of
+// a processor do that do not multiply. What is above zero is in order as signed integers, above all else. What is below
+// zero is so as unsigned ones, the lowest last. Nothing is NaN while M is at most 2^30: a plane's normal is then at
+// most 20 M^2, and no product with a coefficient of at most 12 M^2 overflows, so that no two infinities are added.
+#if DCCD_AVX512
+using DS = hn::RebindToSigned<DF>;
+using DU = hn::RebindToUnsigned<DF>;
+struct Range {
+  hn::Vec<DS> lo;
+  hn::Vec<DU> hi;
+};
+HWY_INLINE Range rangeOf(VF a, VF b, VF c) {
+  const DS s;
+  const DU u;
+  return {hn::Min(hn::Min(hn::BitCast(s, a), hn::BitCast(s, b)), hn::BitCast(s, c)),
+          hn::Min(hn::Min(hn::BitCast(u, a), hn::BitCast(u, b)), hn::BitCast(u, c))};
+}
+HWY_INLINE Range negative(const Range& r) {
+  const auto sign = hn::Set(DU(), 0x80000000u);
+  return {hn::BitCast(DS(), hn::Xor(r.hi, sign)), hn::Xor(hn::BitCast(DU(), r.lo), sign)};
+}
+HWY_INLINE hn::Mask<DF> isAbove(const Range& r, VF bound) {
+  return hn::RebindMask(DF(), hn::Gt(r.lo, hn::BitCast(DS(), bound)));
+}
+HWY_INLINE hn::Mask<DF> isBelow(const Range& r, VF bound) {
+  return hn::RebindMask(DF(), hn::Gt(r.hi, hn::BitCast(DU(), bound)));
+}
+#else
 struct Range {
   VF lo, hi;
 };
 HWY_INLINE Range rangeOf(VF a, VF b, VF c) { return {hn::Min(hn::Min(a, b), c), hn::Max(hn::Max(a, b), c)}; }
+HWY_INLINE Range negative(const Range& r) { return {hn::Neg(r.hi), hn::Neg(r.lo)}; }
+HWY_INLINE hn::Mask<DF> isAbove(const Range& r, VF bound) { return hn::Gt(r.lo, bound); }
+HWY_INLINE hn::Mask<DF> isBelow(const Range& r, VF bound) { return hn::Lt(r.hi, bound); }
+#endif
 
 // Largest lower end and smallest upper end over the four quantities: opposite strict signs when both are beyond the
-// margin.
+// margin. (As unsigned integers, the largest number is the lowest one.)
 struct Opposite {
-  VF largest_lo, smallest_hi;
+  Range ends;
   HWY_INLINE void add(const Range& r) {
-    largest_lo = hn::Max(largest_lo, r.lo);
-    smallest_hi = hn::Min(smallest_hi, r.hi);
+    ends.lo = hn::Max(ends.lo, r.lo);
+    ends.hi = DCCD_AVX512 ? hn::Max(ends.hi, r.hi) : hn::Min(ends.hi, r.hi);
   }
 };
 
@@ -67,13 +99,12 @@ template <bool EDGE_EDGE, class Component>
 HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const Quadratic& ab, const Quadratic& T,
                                  const Component& component, VF margin) {
   const auto range = [&](const Quadratic& q) { return rangeOf(component(q.A), component(q.B), component(q.C)); };
-  const Range first = range(bc);
-  Opposite o{first.lo, first.hi};
+  Opposite o{range(bc)};
   o.add(range(ca));
   const Range r = range(ab);
-  o.add(EDGE_EDGE ? Range{hn::Neg(r.hi), hn::Neg(r.lo)} : r);
+  o.add(EDGE_EDGE ? negative(r) : r);
   o.add(range(T));
-  return hn::And(hn::Gt(o.largest_lo, margin), hn::Lt(o.smallest_hi, hn::Neg(margin)));
+  return hn::And(isAbove(o.ends, margin), isBelow(o.ends, hn::Neg(margin)));
 }
 
 // The six vectors of a block of pairs, four values a lane (the fourth is 0).
