@@ -47,19 +47,51 @@ HWY_INLINE Quadratic cross(const Vec3V& a0, const Vec3V& a1, const Vec3V& b0, co
 }
 HWY_INLINE Quadratic operator+(const Quadratic& p, const Quadratic& q) { return {p.A + q.A, p.B + q.B, p.C + q.C}; }
 
-// Smallest and largest coefficient of one scalar quadratic.
+// What is asked of the coefficients of one scalar quadratic: are all above a positive bound, or all below a negative
+// one? The smallest and the largest tell. With AVX-512 the bits of the numbers are compared as integers, which units of
+// a processor do that do not multiply. What is above zero is in order as signed integers, above all else. What is below
+// zero is so as unsigned ones, the lowest last. Nothing is NaN while M is at most 2^30: a plane's normal is then at
+// most 20 M^2, and no product with a coefficient of at most 12 M^2 overflows, so that no two infinities are added.
+#if DCCD_AVX512
+using DS = hn::RebindToSigned<DF>;
+using DU = hn::RebindToUnsigned<DF>;
+struct Range {
+  hn::Vec<DS> lo;
+  hn::Vec<DU> hi;
+};
+HWY_INLINE Range rangeOf(VF a, VF b, VF c) {
+  const DS s;
+  const DU u;
+  return {hn::Min(hn::Min(hn::BitCast(s, a), hn::BitCast(s, b)), hn::BitCast(s, c)),
+          hn::Min(hn::Min(hn::BitCast(u, a), hn::BitCast(u, b)), hn::BitCast(u, c))};
+}
+HWY_INLINE Range negative(const Range& r) {
+  const auto sign = hn::Set(DU(), 0x80000000u);
+  return {hn::BitCast(DS(), hn::Xor(r.hi, sign)), hn::Xor(hn::BitCast(DU(), r.lo), sign)};
+}
+HWY_INLINE hn::Mask<DF> isAbove(const Range& r, VF bound) {
+  return hn::RebindMask(DF(), hn::Gt(r.lo, hn::BitCast(DS(), bound)));
+}
+HWY_INLINE hn::Mask<DF> isBelow(const Range& r, VF bound) {
+  return hn::RebindMask(DF(), hn::Gt(r.hi, hn::BitCast(DU(), bound)));
+}
+#else
 struct Range {
   VF lo, hi;
 };
 HWY_INLINE Range rangeOf(VF a, VF b, VF c) { return {hn::Min(hn::Min(a, b), c), hn::Max(hn::Max(a, b), c)}; }
+HWY_INLINE Range negative(const Range& r) { return {hn::Neg(r.hi), hn::Neg(r.lo)}; }
+HWY_INLINE hn::Mask<DF> isAbove(const Range& r, VF bound) { return hn::Gt(r.lo, bound); }
+HWY_INLINE hn::Mask<DF> isBelow(const Range& r, VF bound) { return hn::Lt(r.hi, bound); }
+#endif
 
 // Largest lower end and smallest upper end over the four quantities: opposite strict signs when both are beyond the
-// margin.
+// margin. (As unsigned integers, the largest number is the lowest one.)
 struct Opposite {
-  VF largest_lo, smallest_hi;
+  Range ends;
   HWY_INLINE void add(const Range& r) {
-    largest_lo = hn::Max(largest_lo, r.lo);
-    smallest_hi = hn::Min(smallest_hi, r.hi);
+    ends.lo = hn::Max(ends.lo, r.lo);
+    ends.hi = DCCD_AVX512 ? hn::Max(ends.hi, r.hi) : hn::Min(ends.hi, r.hi);
   }
 };
 
@@ -67,20 +99,20 @@ template <bool EDGE_EDGE, class Component>
 HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const Quadratic& ab, const Quadratic& T,
                                  const Component& component, VF margin) {
   const auto range = [&](const Quadratic& q) { return rangeOf(component(q.A), component(q.B), component(q.C)); };
-  const Range first = range(bc);
-  Opposite o{first.lo, first.hi};
+  Opposite o{range(bc)};
   o.add(range(ca));
   const Range r = range(ab);
-  o.add(EDGE_EDGE ? Range{hn::Neg(r.hi), hn::Neg(r.lo)} : r);
+  o.add(EDGE_EDGE ? negative(r) : r);
   o.add(range(T));
-  return hn::And(hn::Gt(o.largest_lo, margin), hn::Lt(o.smallest_hi, hn::Neg(margin)));
+  return hn::And(isAbove(o.ends, margin), isBelow(o.ends, hn::Neg(margin)));
 }
 
 // The six vectors of a block of pairs, four values a lane (the fourth is 0).
 constexpr size_t BLOCK_SIZE = 6 * 4 * MAX_LANES;
 
 // Differences of one pair to its origin point, rounded once in double and once to float. A block is laid out as
-// [time][point][lane][4]; with AVX-512, where one vector holds both times, as [point][lane][time][4].
+// [time][point][lane][4]; with AVX-512, where one vector holds both times, as [point][lane][time][4], each lane of the
+// first half beside the one eight further on.
 template <bool EDGE_EDGE>
 HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
                        float* HWY_RESTRICT block) {
@@ -91,8 +123,8 @@ HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_
     const auto origin = hn::Load(dd, o + k);
     for (size_t i = 0; i < 3; ++i) {
       const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
-      float* to =
-          DCCD_AVX512 ? block + (i * MAX_LANES + lane) * 8 : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
+      float* to = DCCD_AVX512 ? block + (i * MAX_LANES + lane % 8 * 2 + lane / 8) * 8
+                              : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
       hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, v + k), origin)), df, to);
     }
   }
@@ -101,14 +133,31 @@ HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_
 // Of point i, at t0 and t1.
 HWY_INLINE void loadPoint(const float* HWY_RESTRICT block, size_t i, Vec3V& p0, Vec3V& p1) {
   const DF d;
-  VF unused;
 #if DCCD_AVX512
-  Vec3V low, high;  // the first half of the lanes, each at t0 and t1, and the other half
-  hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES, low.x, low.y, low.z, unused);
-  hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES + 4 * MAX_LANES, high.x, high.y, high.z, unused);
-  p0 = {hn::ConcatEven(d, high.x, low.x), hn::ConcatEven(d, high.y, low.y), hn::ConcatEven(d, high.z, low.z)};
-  p1 = {hn::ConcatOdd(d, high.x, low.x), hn::ConcatOdd(d, high.y, low.y), hn::ConcatOdd(d, high.z, low.z)};
+  const hn::RepartitionToWide<DF> two;  // a pair of lanes moves as one number
+  VF xy[4], z[4];                       // of two lanes each
+  for (size_t k = 0; k < 4; ++k) {
+    const VF one = hn::Load(d, block + (i * 8 + 2 * k) * MAX_LANES);
+    const VF other = hn::Load(d, block + (i * 8 + 2 * k + 1) * MAX_LANES);
+    xy[k] = hn::InterleaveLower(d, one, other);
+    z[k] = hn::InterleaveUpper(d, one, other);
+  }
+  // A coordinate, four lanes a block of 128 bits: at t0, at t1, and both of the lanes eight further on.
+  const auto split = [d](VF first, VF second, VF& at_t0, VF& at_t1) HWY_ATTR {
+    at_t0 = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(second), first);
+    at_t1 = hn::OddEvenBlocks(second, hn::SwapAdjacentBlocks(first));
+  };
+  const auto lower = [&](const VF* v) HWY_ATTR {
+    return hn::BitCast(d, hn::InterleaveLower(two, hn::BitCast(two, v[0]), hn::BitCast(two, v[1])));
+  };
+  const auto upper = [&](const VF* v) HWY_ATTR {
+    return hn::BitCast(d, hn::InterleaveUpper(two, hn::BitCast(two, v[0]), hn::BitCast(two, v[1])));
+  };
+  split(lower(xy), lower(xy + 2), p0.x, p1.x);
+  split(upper(xy), upper(xy + 2), p0.y, p1.y);
+  split(lower(z), lower(z + 2), p0.z, p1.z);
 #else
+  VF unused;
   hn::LoadInterleaved4(d, block + i * 4 * MAX_LANES, p0.x, p0.y, p0.z, unused);
   hn::LoadInterleaved4(d, block + (3 + i) * 4 * MAX_LANES, p1.x, p1.y, p1.z, unused);
 #endif

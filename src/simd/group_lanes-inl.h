@@ -136,18 +136,53 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
 }
 #endif
 
-// The nodes of one group, kept at hand while each node of another group is compared with all of them.
+// Which lanes of a group are looked at: all of them. Takes a vector of theirs to the vector that is looked at.
+struct AllLanes {
+  using D = hn::CappedTag<uint32_t, GROUP>;
 #if DCCD_AVX512
-template <bool T0_ONLY>
-class GroupLanes {  // in up to 16 of the 32 registers
-  using D = hn::FixedTag<int16_t, 2 * GROUP>;
+  HWY_INLINE hn::Vec<D> operator()(hn::Vec<D> lanes) const { return lanes; }
+  HWY_INLINE hn::Vec<D> together(hn::Vec<D> lanes) const { return lanes; }
+#endif
+};
+
+#if DCCD_AVX512
+// From a table: Iota() is written to the stack lane by lane, and read back at once.
+HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
+HWY_INLINE hn::Mask<AllLanes::D> maskOf(uint32_t bits) {
+  const uint8_t packed[8] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
+  return hn::LoadMaskBits(AllLanes::D(), packed);
+}
+
+// The lanes of a mask, no more than half of all, moved together: vectors of half the size take half the time.
+class FewLanes {
+  using All = AllLanes::D;
 
  public:
-  HWY_INLINE explicit GroupLanes(const int16_t* HWY_RESTRICT lanes) {
+  using D = hn::Half<All>;
+  HWY_INLINE explicit FewLanes(uint32_t mask)
+      : front_(hn::IndicesFromVec(All(), hn::Compress(hn::Load(All(), LANES), maskOf(mask)))) {}
+  HWY_INLINE hn::Vec<D> operator()(hn::Vec<All> lanes) const { return hn::LowerHalf(D(), together(lanes)); }
+  HWY_INLINE hn::Vec<All> together(hn::Vec<All> lanes) const { return hn::TableLookupLanes(lanes, front_); }
+
+ private:
+  decltype(hn::IndicesFromVec(All(), hn::Zero(All()))) front_;
+};
+
+// The nodes of one group, kept at hand while each node of another group is compared with all of them.
+template <bool T0_ONLY, class Lanes>
+class GroupLanes {  // in up to 16 of the 32 registers
+  using D = hn::Repartition<int16_t, typename Lanes::D>;
+
+ public:
+  HWY_INLINE GroupLanes(const int16_t* HWY_RESTRICT group, const Lanes& lanes) {
     for (size_t i = 0; i < RECORD; ++i) {
       // With one time alone nothing is read of the other: the callers' arrays may end before it.
       const size_t at = i * 2 * GROUP;
-      if (!T0_ONLY || at % (RECORD * GROUP) < SOA_T1) vectors_[i] = hn::Load(D(), lanes + at);
+      if (T0_ONLY && at % (RECORD * GROUP) >= SOA_T1) continue;
+      const AllLanes::D d;
+      vectors_[i] =
+          hn::BitCast(D(), lanes(hn::BitCast(d, hn::Load(hn::Repartition<int16_t, decltype(d)>(), group + at))));
     }
   }
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return vectors_[at / (2 * GROUP)]; }
@@ -159,16 +194,16 @@ class GroupLanes {  // in up to 16 of the 32 registers
   hn::Vec<D> vectors_[RECORD];
 };
 #else
-template <bool T0_ONLY>
+template <bool T0_ONLY, class Lanes>
 class GroupLanes {
  public:
-  HWY_INLINE explicit GroupLanes(const int16_t* HWY_RESTRICT lanes) : lanes_(lanes) {}
+  HWY_INLINE GroupLanes(const int16_t* HWY_RESTRICT group, Lanes) : group_(group) {}
   HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
-    return meeting<T0_ONLY>(lo, hi, GROUP, lanes_);
+    return meeting<T0_ONLY>(lo, hi, GROUP, group_);
   }
 
  private:
-  const int16_t* HWY_RESTRICT lanes_;
+  const int16_t* HWY_RESTRICT group_;
 };
 #endif
 

@@ -16,23 +16,20 @@ namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Writes the pairs of one node with those lanes of another group that are in a mask, node first or second, in the order
-// of lanes.
+// Writes the pairs of a node with lanes of the group opposite it, node first or second, in the order of lanes.
 class PairWriter {
  public:
-  // Lanes are numbered from `base`.
-  HWY_INLINE PairWriter(bool node_first, uint32_t base);
-  // Returns where the next pair goes. There is room for all lanes from o on.
+  // Lanes of the group are numbered from `base`.
+  template <class Lanes>
+  HWY_INLINE PairWriter(const Lanes& lanes, bool node_first, uint32_t base);
+  // Of the lanes in a mask; returns where the next pair goes. There is room for all lanes from o on.
   HWY_INLINE uint32_t* write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const;
 
  private:
 #if DCCD_AVX512
-  // A pair is one number of 64 bits, of which the lower half, written first, is the node or the lane.
-  using D = hn::FixedTag<uint32_t, GROUP>;
-  using Pairs = hn::FixedTag<uint64_t, GROUP / 2>;
-  hn::Vec<D> lanes_;
-  hn::Vec<Pairs> lane_shift_;
-  unsigned node_shift_;
+  using D = AllLanes::D;
+  hn::Vec<D> lanes_;        // their numbers
+  hn::Mask<D> node_slots_;  // of the numbers of eight pairs, those of nodes
 #else
   bool node_first_;
   uint32_t base_;
@@ -40,28 +37,29 @@ class PairWriter {
 };
 
 #if DCCD_AVX512
-// From a table: Iota() is written to the stack lane by lane, and read back at once.
-HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+template <class Lanes>
+PairWriter::PairWriter(const Lanes& lanes, bool node_first, uint32_t base)
+    : lanes_(lanes.together(hn::Add(hn::Load(D(), LANES), hn::Set(D(), base)))),
+      node_slots_(maskOf(node_first ? 0x5555 : 0xaaaa)) {}
 
-PairWriter::PairWriter(bool node_first, uint32_t base)
-    : lanes_(hn::Add(hn::Load(D(), LANES), hn::Set(D(), base))),
-      lane_shift_(hn::Set(Pairs(), node_first ? 32 : 0)),
-      node_shift_(node_first ? 0 : 32) {}
-
-// Without a branch on the number of lanes, which is unpredictable: two whole vectors are stored, and o moves on by what
-// counts.
+// Hardly a node meets more than eight lanes. Below that there is no branch on their number, which nothing foretells: a
+// whole vector is stored, and o moves on by what counts.
 uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const {
-  const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
-  const auto lanes = hn::Compress(lanes_, hn::LoadMaskBits(D(), packed));
-  const auto nodes = hn::Set(Pairs(), uint64_t{node} << node_shift_);
-  const auto pairsOf = [&](hn::Vec<hn::Half<D>> half)
-                           HWY_ATTR { return hn::Or(hn::Shl(hn::PromoteTo(Pairs(), half), lane_shift_), nodes); };
-  hn::StoreU(hn::BitCast(D(), pairsOf(hn::LowerHalf(hn::Half<D>(), lanes))), D(), o);
-  hn::StoreU(hn::BitCast(D(), pairsOf(hn::UpperHalf(hn::Half<D>(), lanes))), D(), o + GROUP);
-  return o + 2 * hwy::PopCount(mask);
+  HWY_ALIGN static constexpr uint32_t TWICE[2 * GROUP] = {0, 0, 1, 1, 2,  2,  3,  3,  4,  4,  5,  5,  6,  6,  7,  7,
+                                                          8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13, 14, 14, 15, 15};
+  const auto lanes = hn::Compress(lanes_, maskOf(mask)), nodes = hn::Set(D(), node);
+  const auto store = [&](size_t at) HWY_ATTR {
+    const auto pairs = hn::TableLookupLanes(lanes, hn::IndicesFromVec(D(), hn::Load(D(), TWICE + at)));
+    hn::StoreU(hn::IfThenElse(node_slots_, nodes, pairs), D(), o + at);
+  };
+  const size_t count = hwy::PopCount(mask);
+  store(0);
+  if (HWY_UNLIKELY(count > GROUP / 2)) store(GROUP);
+  return o + 2 * count;
 }
 #else
-PairWriter::PairWriter(bool node_first, uint32_t base) : node_first_(node_first), base_(base) {}
+template <class Lanes>
+PairWriter::PairWriter(const Lanes&, bool node_first, uint32_t base) : node_first_(node_first), base_(base) {}
 
 uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const {
   for (; mask; mask &= mask - 1) {
@@ -82,16 +80,59 @@ struct LeaveNoneOut {
 };
 
 // Features of A and B vertices that share one: their vertices lane by lane.
-template <size_t A, size_t B>
-struct LeaveAdjacentOut {
+template <size_t A, size_t B, class Lanes>
+class LeaveAdjacentOut {
+ public:
   static constexpr bool FIRST = false;
-  const uint32_t* HWY_RESTRICT a;
-  const uint32_t* HWY_RESTRICT b;
-  bool by_rows;  // node i is in the first group
-  HWY_INLINE uint32_t from(uint32_t i, uint32_t mask) const {
-    return mask & ~(by_rows ? sharing<A, B>(a, i, b) : sharing<B, A>(b, i, a));
-  }
+  // by_rows: node i is in the first group.
+  HWY_INLINE LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, bool by_rows,
+                              const Lanes& lanes);
+  HWY_INLINE uint32_t from(uint32_t i, uint32_t mask) const;
+
+ private:
+#if DCCD_AVX512
+  using D = typename Lanes::D;
+  // Of the k-th pair of a vertex of a and one of b, which are compared.
+  const uint32_t* HWY_RESTRICT of_nodes_[A * B];
+  hn::Vec<D> of_lanes_[A * B];
+#else
+  const uint32_t* HWY_RESTRICT a_;
+  const uint32_t* HWY_RESTRICT b_;
+  bool by_rows_;
+#endif
 };
+
+#if DCCD_AVX512
+template <size_t A, size_t B, class Lanes>
+LeaveAdjacentOut<A, B, Lanes>::LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b,
+                                                bool by_rows, const Lanes& lanes) {
+  const uint32_t *HWY_RESTRICT nodes = by_rows ? a : b, *HWY_RESTRICT opposite = by_rows ? b : a;
+  for (size_t k = 0; k < A * B; ++k) {
+    // Groups that are alike change places without a difference: a vertex of a node then is loaded once for all lanes'.
+    const bool node_first = A == B || by_rows;
+    of_nodes_[k] = nodes + (node_first ? k / B : k % B) * GROUP;
+    of_lanes_[k] = lanes(hn::Load(AllLanes::D(), opposite + (node_first ? k % B : k / B) * GROUP));
+  }
+}
+
+template <size_t A, size_t B, class Lanes>
+uint32_t LeaveAdjacentOut<A, B, Lanes>::from(uint32_t i, uint32_t mask) const {
+  const D d;
+  auto same = hn::Eq(hn::Set(d, of_nodes_[0][i]), of_lanes_[0]);
+  for (size_t k = 1; k < A * B; ++k) same = hn::Or(same, hn::Eq(hn::Set(d, of_nodes_[k][i]), of_lanes_[k]));
+  return mask & ~bitsOf(d, same);
+}
+#else
+template <size_t A, size_t B, class Lanes>
+LeaveAdjacentOut<A, B, Lanes>::LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b,
+                                                bool by_rows, const Lanes&)
+    : a_(a), b_(b), by_rows_(by_rows) {}
+
+template <size_t A, size_t B, class Lanes>
+uint32_t LeaveAdjacentOut<A, B, Lanes>::from(uint32_t i, uint32_t mask) const {
+  return mask & ~(by_rows_ ? sharing<A, B>(a_, i, b_) : sharing<B, A>(b_, i, a_));
+}
+#endif
 
 struct LeaveKnownOut {
   static constexpr bool FIRST = true;
@@ -116,15 +157,19 @@ HWY_INLINE const LanePairs& pairsOf(const KnownPairs& known, uint32_t g, uint32_
 // first of them comes before that.
 struct NoneOf {
   HWY_INLINE void next(uint32_t, uint32_t) {}
-  HWY_INLINE LeaveNoneOut of(uint32_t, uint32_t, bool) const { return {}; }
+  template <class Lanes>
+  HWY_INLINE LeaveNoneOut of(uint32_t, uint32_t, bool, const Lanes&) const {
+    return {};
+  }
 };
 
 template <size_t A, size_t B>
 struct AdjacentOf {
   const GroupsView &a, &b;
   HWY_INLINE void next(uint32_t, uint32_t) {}
-  HWY_INLINE LeaveAdjacentOut<A, B> of(uint32_t g, uint32_t h, bool by_rows) const {
-    return {a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows};
+  template <class Lanes>
+  HWY_INLINE LeaveAdjacentOut<A, B, Lanes> of(uint32_t g, uint32_t h, bool by_rows, const Lanes& lanes) const {
+    return {a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows, lanes};
   }
 };
 
@@ -137,14 +182,57 @@ struct KnownOf {
     soon = &pairsOf(known, g, h);
     hwy::Prefetch(soon);
   }
-  HWY_INLINE LeaveKnownOut of(uint32_t, uint32_t, bool by_rows) const { return {by_rows ? now->rows : now->columns}; }
+  HWY_INLINE LeaveKnownOut of(uint32_t, uint32_t, bool by_rows, const AllLanes&) const {
+    return {by_rows ? now->rows : now->columns};
+  }
 };
 
 // Whether a node meets anything is unpredictable. Where a test costs no more than a mispredicted branch, all nodes are
 // tested first, and then what met is written.
 constexpr bool WRITES_LATER = DCCD_AVX512;
 
-// The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
+// A pair of groups, g and h: nodes of one are compared with lanes of the other, by rows those of g with h's.
+struct NodesAndLanes {
+  const int16_t *HWY_RESTRICT soa_of_nodes, *HWY_RESTRICT soa_of_lanes;
+  uint32_t nodes, lanes;  // masks: which may meet something
+  uint32_t g, h;
+  bool by_rows;
+};
+
+// The surviving pairs of nodes and lanes, less what is left out: to o, which is returned moved on.
+template <bool T0_ONLY, class Lanes, class LeaveOutOf>
+HWY_INLINE uint32_t* testNodes(const NodesAndLanes& pair, const Lanes& lanes, uint32_t mask_of_lanes, bool same,
+                               Diagonal diagonal, const LeaveOutOf& left_out, uint32_t* HWY_RESTRICT o) {
+  const GroupLanes<T0_ONLY, Lanes> group(pair.soa_of_lanes, lanes);
+  const PairWriter writer(lanes, pair.by_rows, (pair.by_rows ? pair.h : pair.g) * GROUP);
+  const uint32_t base = (pair.by_rows ? pair.g : pair.h) * GROUP;
+  const auto leave_out = left_out.of(pair.g, pair.h, pair.by_rows, lanes);
+  constexpr bool LEAVES_OUT_FIRST = decltype(leave_out)::FIRST;
+  uint32_t met[GROUP], to_write = 0;
+  for (uint32_t left = pair.nodes; left; left &= left - 1) {
+    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
+    uint32_t mask = mask_of_lanes;
+    // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
+    if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
+    if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
+    if (LEAVES_OUT_FIRST) mask = leave_out.from(i, mask);
+    if (mask == 0) continue;
+    mask &= group.meets(pair.soa_of_nodes + soaIndex(0, i), pair.soa_of_nodes + RECORD * GROUP + soaIndex(0, i));
+    if (WRITES_LATER) {
+      met[i] = LEAVES_OUT_FIRST ? mask : leave_out.from(i, mask);
+      to_write |= static_cast<uint32_t>(met[i] != 0) << i;
+    } else if (mask) {
+      o = writer.write(base + i, LEAVES_OUT_FIRST ? mask : leave_out.from(i, mask), o);
+    }
+  }
+  for (; to_write; to_write &= to_write - 1) {
+    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(to_write));
+    o = writer.write(base + i, met[i], o);
+  }
+  return o;
+}
+
+// One pair of groups.
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
                               Diagonal diagonal, const LeaveOutOf& left_out, uint32_t* HWY_RESTRICT o) {
@@ -158,37 +246,17 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   if (cols == 0) return o;
   // Broadcast the nodes of the side with fewer left.
   const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
-  const int16_t* HWY_RESTRICT outer = by_rows ? sa : sb;
-  const GroupLanes<T0_ONLY> lanes(by_rows ? sb : sa);
-  const uint32_t inner_mask = by_rows ? cols : rows;
-  const PairWriter writer(by_rows, (by_rows ? h : g) * GROUP);
-  const uint32_t base = (by_rows ? g : h) * GROUP;
-  const auto leave_out = left_out.of(g, h, by_rows);
-  constexpr bool LEAVES_OUT_FIRST = decltype(leave_out)::FIRST;
-  const auto write = [&](uint32_t i, uint32_t mask)
-                         HWY_ATTR { o = writer.write(base + i, LEAVES_OUT_FIRST ? mask : leave_out.from(i, mask), o); };
-  uint32_t met[GROUP], to_write = 0;
-  for (uint32_t left = by_rows ? rows : cols; left; left &= left - 1) {
-    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
-    uint32_t mask = inner_mask;
-    // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
-    if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
-    if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
-    if (LEAVES_OUT_FIRST) mask = leave_out.from(i, mask);
-    if (mask == 0) continue;
-    mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
-    if (WRITES_LATER) {
-      met[i] = mask;
-      to_write |= static_cast<uint32_t>(mask != 0) << i;
-    } else if (mask) {
-      write(i, mask);
+  const NodesAndLanes pair = {
+      by_rows ? sa : sb, by_rows ? sb : sa, by_rows ? rows : cols, by_rows ? cols : rows, g, h, by_rows};
+#if DCCD_AVX512
+  if constexpr (!T0_ONLY) {
+    const auto few = static_cast<uint32_t>(hwy::PopCount(pair.lanes));
+    if (few <= GROUP / 2) {
+      return testNodes<T0_ONLY>(pair, FewLanes(pair.lanes), (1u << few) - 1, false, diagonal, left_out, o);
     }
   }
-  for (; to_write; to_write &= to_write - 1) {
-    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(to_write));
-    write(i, met[i]);
-  }
-  return o;
+#endif
+  return testNodes<T0_ONLY>(pair, AllLanes(), pair.lanes, same, diagonal, left_out, o);
 }
 
 template <bool T0_ONLY>

@@ -67,14 +67,15 @@ struct Groups {
   }
 };
 
-/// range: of the values; small ones make ties. Some lanes, and now and then whole groups, are empty.
+/// range: of the values; small ones make ties. Some lanes are empty, of one group in four most, and now and then all.
 inline Groups randomGroups(Random& random, std::size_t count, int range, int size) {
   Groups groups;
   for (std::size_t g = 0; g < count; ++g) {
     const bool all_empty = random() % 16 == 0;
+    const std::size_t full_of_eight = random() % 4 == 0 ? 3 : 7;
     for (std::size_t i = 0; i < GROUP; ++i) {
       Node n = emptyNode();
-      if (!all_empty && random() % 8 != 0) {
+      if (!all_empty && random() % 8 < full_of_eight) {
         for (std::size_t k = 0; k < RECORD; ++k) {
           const std::int16_t a = anyRecordValue(random, range);
           const int b = a + static_cast<int>(random() % static_cast<unsigned>(size + 1));

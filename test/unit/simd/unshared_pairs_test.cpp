@@ -16,7 +16,7 @@ namespace {
 using namespace simd;
 using Random = std::mt19937_64;
 
-/// Two groups of features over the same few vertices, some lanes empty.
+/// Two groups of features over the same few vertices, some lanes empty, now and then most.
 struct LeafGroups {
   std::size_t arity;
   std::vector<std::uint32_t> features;  // 2 x 16 x arity
@@ -28,8 +28,9 @@ struct LeafGroups {
       : arity(arity),
         soa(hwy::AllocateAligned<std::int16_t>(2 * SOA_SIZE)),
         aos(hwy::AllocateAligned<std::int16_t>(2 * AOS_SIZE)) {
+    const std::size_t empty_of_ten = random() % 3 == 0 ? 7 : 1;
     for (std::size_t i = 0; i < 2 * GROUP; ++i) {
-      const bool empty = random() % 10 == 0;
+      const bool empty = random() % 10 < empty_of_ten;
       const std::size_t first = random() % vertices;
       for (std::size_t k = 0; k < arity; ++k) {
         features.push_back(empty ? UINT32_MAX : static_cast<std::uint32_t>((first + k) % vertices));
