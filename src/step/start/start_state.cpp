@@ -17,7 +17,7 @@ constexpr std::size_t FEW_CANDIDATES = 4096;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
 constexpr std::size_t FAN_UNIT = 64;               // groups of vertices of a unit
 constexpr std::size_t UNITS_A_THREAD = 4;          // between two looks at the clock
-constexpr std::size_t LISTED_AHEAD = 16;           // pairs whose faces are fetched before they are listed
+constexpr std::size_t LISTED_AHEAD = 16;           // pairs that are fetched before they are listed
 constexpr std::size_t LISTED_PIECE = 4096;         // pairs that a thread lists at once
 constexpr std::size_t NEAR_PIECE = 4096;           // vertices that a thread moves near at once
 constexpr std::size_t VIEWED_PIECE = 256;          // groups of faces that a thread looks at once
@@ -110,6 +110,9 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
     for (std::size_t i = first; i < last; ++i) {
       const auto edge = static_cast<Index>(keys_[i] >> shift), face = static_cast<Index>(keys_[i] & faces);
       const std::uint64_t soon = keys_[std::min(i + LISTED_AHEAD, last - 1)];
+      const std::vector<Edge>& edges = bodies[body[0]].setup.topology->edges();
+      const std::size_t edge_soon = (soon >> shift) - bodies[body[0]].edge_begin;
+      if (edge_soon < edges.size()) __builtin_prefetch(&edges[edge_soon]);
       const std::size_t listed_soon = (soon & faces) - bodies[body[1]].face_begin;
       const std::vector<Face>& listed = neighbourhoods_[body[1]].listed;
       if (listed_soon < listed.size()) __builtin_prefetch(&listed[listed_soon]);
