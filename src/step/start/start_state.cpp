@@ -17,11 +17,12 @@ constexpr std::size_t FEW_CANDIDATES = 4096;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
 constexpr std::size_t FAN_UNIT = 64;               // groups of vertices of a unit
 constexpr std::size_t UNITS_A_THREAD = 4;          // between two looks at the clock
-constexpr std::size_t LISTED_AHEAD = 16;           // pairs whose faces are fetched before they are listed
+constexpr std::size_t LISTED_AHEAD = 16;           // pairs that are fetched before they are listed
 constexpr std::size_t LISTED_PIECE = 4096;         // pairs that a thread lists at once
 constexpr std::size_t NEAR_PIECE = 4096;           // vertices that a thread moves near at once
 constexpr std::size_t VIEWED_PIECE = 256;          // groups of faces that a thread looks at once
 constexpr std::size_t PIECE = 4;                   // units that a thread takes at once
+constexpr std::size_t COPIED_PIECE = 64;           // units of which a thread copies at once what is found
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
 
@@ -29,6 +30,17 @@ std::size_t edgeCount(const SceneArrays& scene) {
   std::size_t n = 0;
   for (const SceneBody& body : scene.bodies()) n += body.tree(FeatureKind::EDGE).featureCount();
   return n;
+}
+
+/// List i goes to place[i] and on, up to place[i + 1].
+void join(const std::vector<std::vector<EdgeFace>>& lists, const std::vector<std::size_t>& place,
+          std::vector<EdgeFace>& out, const StartStateSearch::Parallel& parallel) {
+  out.resize(place.back());
+  parallel(place.size() - 1, COPIED_PIECE, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      std::copy(lists[i].begin(), lists[i].end(), out.begin() + static_cast<std::ptrdiff_t>(place[i]));
+    }
+  });
 }
 
 }  // namespace
@@ -110,6 +122,9 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
     for (std::size_t i = first; i < last; ++i) {
       const auto edge = static_cast<Index>(keys_[i] >> shift), face = static_cast<Index>(keys_[i] & faces);
       const std::uint64_t soon = keys_[std::min(i + LISTED_AHEAD, last - 1)];
+      const std::vector<Edge>& edges = bodies[body[0]].setup.topology->edges();
+      const std::size_t edge_soon = (soon >> shift) - bodies[body[0]].edge_begin;
+      if (edge_soon < edges.size()) __builtin_prefetch(&edges[edge_soon]);
       const std::size_t listed_soon = (soon & faces) - bodies[body[1]].face_begin;
       const std::vector<Face>& listed = neighbourhoods_[body[1]].listed;
       if (listed_soon < listed.size()) __builtin_prefetch(&listed[listed_soon]);
@@ -326,13 +341,16 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
         unit_tested_[i] = finder.tested() - before;
       }
     });
-    for (std::size_t i = 0; i < n; ++i) {
+    std::vector<std::size_t> place{found_.size()};  // of what is found in the units up to the one that ends the search
+    bool goes_on = true;
+    for (std::size_t i = 0; i < n && goes_on; ++i) {
       tested_ += unit_tested_[i];
-      found_.insert(found_.end(), unit_found_[i].begin(), unit_found_[i].end());
-      if (unit_whole_[i] && !hasEnough()) continue;
-      next_unit_ = unit_number_[first + i];
-      return false;
+      place.push_back(place.back() + unit_found_[i].size());
+      goes_on = unit_whole_[i] && place.back() <= most_found_;
+      if (!goes_on) next_unit_ = unit_number_[first + i];
     }
+    join(unit_found_, place, found_, parallel);
+    if (!goes_on) return false;
   }
   return true;
 }
