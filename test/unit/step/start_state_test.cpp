@@ -306,6 +306,19 @@ TEST(StartState, OneCrossingIsEnoughForTheFirstContact) {
   });
 }
 
+// Also where no part of the search finds so much alone.
+TEST(StartState, TheSearchEndsWhereItHasFoundEnough) {
+  const TestStep step = crumpled(3, 2, 48);
+  Options options;
+  const Outcome whole = runOnce(step, options);
+  options.max_found = whole.intersections.size() / 8;
+  options.num_threads = 2;
+  const Outcome some = runOnce(step, options);
+  EXPECT_TRUE(some.cut);
+  EXPECT_EQ(some.intersections.size(), options.max_found);
+  EXPECT_LT(2 * some.stats[Stage::START_STATE].in, whole.stats[Stage::START_STATE].in);
+}
+
 // In a stream without a contact its end is known, as with all contacts; a contact, or a crossing, ends that.
 TEST(StartState, WithoutAFirstContactTheEndIsKnown) {
   TestStep step;
