@@ -36,8 +36,10 @@ OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std
 void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before,
            std::size_t max_unknown, LoadedMap& map) {
   const auto counted = [memory](auto made) { return memory ? memory->counted(std::move(made)) : made; };
-  // A map that has nothing free does not tell what it has seen: for own voxels, what is not occupied is free there.
-  if (config.unknown_space != UnknownSpace::FREE || (config.needsKnownSpace() && !decoded.free.empty())) {
+  // A map that has nothing free does not tell what it has seen: for own voxels, what is not occupied is free there. An
+  // empty one has seen nothing: whoever made it began anew.
+  if (config.unknown_space != UnknownSpace::FREE ||
+      (config.needsKnownSpace() && (!decoded.free.empty() || decoded.occupied.empty()))) {
     std::vector<OccupiedLeaf> known;
     known.reserve(decoded.occupied.size() + decoded.free.size());
     known.assign(decoded.occupied.begin(), decoded.occupied.end());

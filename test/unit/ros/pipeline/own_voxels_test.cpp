@@ -62,6 +62,23 @@ TEST_F(OwnVoxelsOfANode, WithALiveMapAloneTheFirstOneIsInDoubt) {
   EXPECT_EQ(driven.feed(1.4, -0.05f).touching, Touching::NEW) << "the table stays";
 }
 
+TEST_F(OwnVoxelsOfANode, AnEmptyMapHasNotSeenTheTableFree) {
+  XmlRpcValue tree = scene();
+  tree["own_voxels_m"] = "auto";
+  tree["octomap_topic"] = "/map";
+  Driven driven(tree);
+  driven.feed(1, 0.35f);
+  give(driven, tableAnd(false), 1);
+  driven.feed(1.1, 0.35f);
+  give(driven, octomap::OcTree(0.1), 1.1);
+  driven.feed(1.2, 0.35f);
+  driven.feed(1.3, 0.05f);
+  give(driven, tableAnd(false), 1.3);
+  const Outcome& near = driven.feed(1.4, 0.05f);
+  EXPECT_TRUE(assuranceOf(near).clear()) << describe(assuranceOf(near));
+  EXPECT_EQ(driven.feed(1.5, -0.05f).touching, Touching::NEW) << "it was there before the cloth came";
+}
+
 TEST_F(OwnVoxelsOfANode, MapsOfACellWithoutTheBodyCountAlsoBeforeItsFirstFrame) {
   XmlRpcValue tree = scene();
   tree["own_voxels_m"] = "auto";

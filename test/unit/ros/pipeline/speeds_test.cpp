@@ -174,6 +174,12 @@ TEST(SafeUntilMessage, SaysUntilWhenWhoAndWhatItRestsOn) {
   asked.clearances[1].body = {0, 0};
   EXPECT_EQ(toSafeUntil(asked, watch, bounds, ros::Time(1.1), "world").assumed[2],
             "neighbours on the surface of 'cloth' are not spoken of");
+  Step doubtful = *outcome.step;
+  doubtful.map.own.doubted = 25;
+  Outcome near = outcome;
+  near.step = std::make_shared<const Step>(doubtful);
+  EXPECT_EQ(toSafeUntil(near, watch, bounds, ros::Time(1.1), "world").assumed[2],
+            "voxels of the map in doubt are no obstacle: 25");
 }
 
 TEST(SafeUntilMessage, HasNoNumberWhereNothingIsKnown) {
