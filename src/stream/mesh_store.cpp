@@ -93,23 +93,24 @@ StepStatus MeshStore::classify(const MeshFrame& frame) const {
 StepStatus MeshStore::push(MeshFrame frame) {
   const StepStatus status = classify(frame);
   if (status == StepStatus::VERTEX_COUNT || status == StepStatus::DUPLICATE) return status;
-  // Stamps must ascend within the store: after a jump back nothing older can be of use.
-  if (status == StepStatus::TIME_JUMP) clear();
-  if (status != StepStatus::OK) {
+  const bool begins = status != StepStatus::OK;
+  if (!begins) frame.topology = newest().topology;  // equal; one object a run, so that pointers tell runs apart
+  const std::size_t vertices = frame.positions.size();
+  // What may throw comes first.
+  frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_ + (begins ? 1 : 0)});
+  vertices_ += vertices;
+  if (begins) {
     ++run_;
     run_reason_ = status;
-  } else if (frame.topology != newest().topology) {
-    frame.topology = newest().topology;  // equal; one object a run, so that pointers tell runs apart
   }
-  // A fast stream of few vertices may run far ahead of a clock body that comes late; large meshes may not fill the
-  // memory.
-  vertices_ += frame.positions.size();
+  // Stamps must ascend within the store: after a jump back nothing older can be of use. A fast stream of few vertices
+  // may run far ahead of a clock body that comes late; large meshes may not fill the memory.
+  const std::size_t most = status == StepStatus::TIME_JUMP ? 1 : options_.capacity;
   const auto full = [&] {
-    const bool may_forget = frames_.size() >= tolerance::FRAMES_ALWAYS_KEPT;
-    return frames_.size() >= options_.capacity || (may_forget && vertices_ > options_.max_vertices);
+    const bool may_forget = frames_.size() > tolerance::FRAMES_ALWAYS_KEPT;
+    return frames_.size() > most || (may_forget && vertices_ > options_.max_vertices);
   };
   while (full()) forgetOldest();
-  frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_});
   return status;
 }
 

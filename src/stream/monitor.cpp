@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -111,46 +112,62 @@ FrameCounters Monitor::total() const {
 }
 
 StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns) {
-  Impl& m = *impl_;
-  m.finishing = false;
-  if (!m.isStream(body)) {
+  try {
+    return impl_->push(body, std::move(frame), now_ns);
+  } catch (...) {
+    impl_->counters.at(body).count(StepStatus::INTERNAL_ERROR);  // every frame ends in a count
+    throw;
+  }
+}
+
+StepStatus Monitor::Impl::push(std::size_t body, MeshFrame frame, std::int64_t now_ns) {
+  finishing = false;
+  if (!isStream(body)) {
     // In a store of its own, so that the newest push counts whatever its stamp: a static body's frame holds at all
     // times.
-    MeshStore store(m.options.store);
+    MeshStore store(options.store);
     const StepStatus status = store.push(std::move(frame));
-    m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
     if (isSeam(status)) {
-      m.stores[body] = std::move(store);
-      m.forgetLast();
+      stores[body] = std::move(store);
+      forgetLast();
     }
+    counters[body].count(isSeam(status) ? StepStatus::OK : status);
     return status;
   }
-  MeshStore& store = m.stores.at(body);
+  MeshStore& store = stores[body];
+  if (body != options.clock_body) {
+    const StepStatus status = store.push(std::move(frame));
+    counters[body].count(status);
+    return status;
+  }
   const std::shared_ptr<const MeshFrame> before = store.empty() ? nullptr : store.newestShared();
-  Impl::Pending step;
+  // Its place comes first: from where the store has the frame, nothing may throw.
+  Pending& step = pending.emplace_back();
   step.stamp_ns = frame.stamp_ns;
   step.arrival_ns = frame.arrival_ns;
-  const StepStatus status = store.push(std::move(frame));
-  if (body != m.options.clock_body) {
-    m.counters[body].count(status);
-    return status;
+  try {
+    step.status = store.push(std::move(frame));
+  } catch (...) {
+    pending.pop_back();
+    throw;
   }
-  step.status = status;
   step.since_ns = now_ns;
-  step.sequence = ++m.sequence;
-  if (before) step.reason = seamReason(status, *before, store.newest(), m.options.store);
-  if (status == StepStatus::OK) {
+  step.sequence = ++sequence;
+  try {
+    if (before) step.reason = seamReason(step.status, *before, store.newest(), options.store);
+  } catch (const std::bad_alloc&) {  // the status alone tells
+  }
+  if (step.status == StepStatus::OK) {
     step.from = store.previous();
     step.to = store.newestShared();
   }
-  if (status == StepStatus::TIME_JUMP) m.jumpBackTo(step.stamp_ns);
-  const auto waits = [](const Impl::Pending& one) { return one.status == StepStatus::OK; };
-  const auto oldest = std::find_if(m.pending.begin(), m.pending.end(), waits);
-  if (m.pending.size() >= m.options.max_waiting && oldest != m.pending.end()) {
-    m.drop(*oldest, StepStatus::NO_BODY, "more than max_waiting steps wait for other bodies");
+  if (step.status == StepStatus::TIME_JUMP) jumpBackTo(step.stamp_ns);
+  const auto waits = [](const Pending& one) { return one.status == StepStatus::OK; };
+  const auto oldest = std::find_if(pending.begin(), pending.end() - 1, waits);
+  if (pending.size() > options.max_waiting && oldest != pending.end() - 1) {
+    drop(*oldest, StepStatus::NO_BODY, "more than max_waiting steps wait for other bodies");
   }
-  m.pending.push_back(std::move(step));
-  return status;
+  return step.status;
 }
 
 /// Steps that wait for other bodies will not get them any more, and those bodies' frames from before the jump, whose

@@ -7,7 +7,9 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <new>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -75,11 +77,18 @@ struct Monitor::Impl {
 
   Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
   bool isStream(std::size_t body) const { return bodies.at(body).motion == BodyMotionKind::STREAM; }
-  void drop(Pending& step, StepStatus status, const std::string& reason) {
+  /// All or nothing. Counts the frame, or has it told as a step.
+  StepStatus push(std::size_t body, MeshFrame frame, std::int64_t now_ns);
+  /// Where there is no memory for the reason, the status alone tells.
+  void drop(Pending& step, StepStatus status, std::string_view reason) noexcept {
     step.status = status;
-    step.reason = reason;
+    try {
+      step.reason = reason;
+    } catch (const std::bad_alloc&) {
+      step.reason.clear();
+    }
   }
-  void dropWaiting(StepStatus status, const std::string& reason) {
+  void dropWaiting(StepStatus status, std::string_view reason) {
     for (Pending& step : pending) {
       if (step.status == StepStatus::OK) drop(step, status, reason);
     }

@@ -2,12 +2,14 @@
 // answers the next step as one to which nothing has happened.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <map>
 #include <memory>
 #include <new>
 #include <optional>
 
 #include "dccd/stream.h"
+#include "dccd/tolerances.h"
 #include "support/step_support.h"
 #include "unit/allocations.h"
 #include "unit/stream/patch_stream.h"
@@ -173,6 +175,74 @@ TEST(NoMemory, QuestionsThatFailAnywhereLeaveNothingHalfDone) {
     return met;
   });
   EXPECT_GT(allocations_of_a_question, 50);
+}
+
+MeshFrame clothFrame(StampNs stamp_ns, const std::shared_ptr<const Topology>& topology) {
+  MeshFrame frame;
+  frame.stamp_ns = stamp_ns;
+  frame.topology = topology;
+  frame.positions = cloth(0, false);
+  return frame;
+}
+
+TEST(NoMemory, AFrameThatIsNotKeptTakesNoRoomInTheStore) {
+  const auto topology = grid(6, 8);
+  MeshStoreOptions options;
+  options.max_vertices = 2 * tolerance::FRAMES_ALWAYS_KEPT * topology->vertexCount();
+  for (const StampNs next_ns : {81 * PERIOD_NS, StampNs{1}}) {  // goes on, or jumps back
+    MeshStore store(options);
+    for (int k = 1; k <= 80; ++k) store.push(clothFrame(k * PERIOD_NS, topology));
+    for (int time = 0; time < 100; ++time) {
+      MeshFrame frame = clothFrame(next_ns, topology);
+      const AllocationFailure failure(0, false);
+      EXPECT_THROW(store.push(std::move(frame)), std::bad_alloc);
+    }
+    EXPECT_EQ(store.push(clothFrame(81 * PERIOD_NS, topology)), StepStatus::OK);
+    EXPECT_EQ(store.size(), 81u);
+  }
+}
+
+/// Of the clock body a start, steps of which the first ones find no room to wait, a gap, and a jump back.
+TEST(NoMemory, EveryFrameThatIsPushedEndsInACount) {
+  const auto topology = grid(6, 8);
+  int thrown_in_all = 0;
+  const auto failAt = [&](int n, bool lasts) {
+    std::vector<Body> bodies(3);
+    bodies[2].motion = BodyMotionKind::STATIC;
+    for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].name = std::to_string(b);
+    MonitorOptions options;
+    options.max_waiting = 2;
+    Monitor monitor(options, bodies);
+    bool met = false;
+    std::array<std::uint64_t, 3> thrown{};
+    for (const StampNs stamp_ns : {1, 2, 3, 4, 5, 500, 501, 2}) {
+      for (std::size_t body = 0; body < bodies.size(); ++body) {
+        MeshFrame frame = clothFrame(stamp_ns * PERIOD_NS, topology);
+        monitor.countReceived(body);
+        const AllocationFailure failure(n, lasts);
+        try {
+          monitor.push(body, std::move(frame), 0);
+        } catch (const std::bad_alloc&) {
+          ++thrown[body];
+        }
+        met = met || failure.met();
+      }
+    }
+    monitor.finish();
+    for (Outcome outcome; monitor.next(0, outcome);) {
+    }
+    for (std::size_t body = 0; body < bodies.size(); ++body) {
+      const FrameCounters& c = monitor.counters(body);
+      EXPECT_EQ(c.received, c.processed() + c.started() + c.skipped()) << "body " << body;
+      EXPECT_EQ(c.of(StepStatus::INTERNAL_ERROR), thrown[body]) << "body " << body;
+      thrown_in_all += static_cast<int>(thrown[body]);
+    }
+    return met;
+  };
+  for (const bool lasts : {false, true}) {
+    EXPECT_GT(failingEverywhere([&](int n) { return failAt(n, lasts); }), 3);
+  }
+  EXPECT_GT(thrown_in_all, 50);
 }
 
 }  // namespace
