@@ -1,6 +1,7 @@
 // Outcome: what a step was answered, as numpy arrays that show the core's own memory.
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <functional>
 #include <string_view>
 
@@ -87,6 +88,31 @@ const py::dtype& geometryType() {
                                 {"approach_speed", "f8", offsetof(ContactGeometry, approach_speed)}},
                                sizeof(ContactGeometry)));
   return *TYPE;
+}
+
+/// Zeros for what lies between the fields of its rows: equal answers have equal bytes, in a file as well.
+template <class T>
+void clearGaps(const py::dtype& type, std::vector<T>& rows) {
+  struct Gap {
+    std::size_t begin, bytes;
+  };
+  static const std::vector<Gap> GAPS = [&type] {
+    std::vector<Gap> gaps;
+    std::size_t end = 0;
+    const auto gapTo = [&](std::size_t begin) {
+      if (begin > end) gaps.push_back({end, begin - end});
+    };
+    for (const py::handle name : type.attr("names")) {
+      const py::tuple field = type.attr("fields")[name];
+      gapTo(field[1].cast<std::size_t>());
+      end = field[1].cast<std::size_t>() + field[0].attr("itemsize").cast<std::size_t>();
+    }
+    gapTo(sizeof(T));
+    return gaps;
+  }();
+  for (T& row : rows) {
+    for (const Gap& gap : GAPS) std::memset(reinterpret_cast<char*>(&row) + gap.begin, 0, gap.bytes);
+  }
 }
 
 template <class T>
@@ -290,6 +316,10 @@ Answer::Answer(Outcome outcome) : outcome_(std::move(outcome)) {
   for (Contact& contact : outcome_.contacts) {
     contact.certainty = contact.certainty == Certainty::CERTAIN ? Certainty::UNDECIDED : Certainty::CERTAIN;
   }
+  clearGaps(contactType(), outcome_.contacts);
+  clearGaps(intersectionType(), outcome_.intersections);
+  clearGaps(patchType(), outcome_.patches);
+  clearGaps(clearanceType(), outcome_.clearances);
 }
 
 void bindOutcome(py::module_& m) {

@@ -21,6 +21,8 @@
 #include <Eigen/Geometry>
 #include <assimp/Importer.hpp>
 
+#include "input/dae_check.h"
+
 namespace dccd {
 
 namespace {
@@ -64,6 +66,7 @@ void addPolygons(const aiScene& scene, const aiNode& root, Positions& corners, s
 /// In the child: a byte, then words; or the number of polygons, their ends and the coordinates of their corners.
 std::string answerOf(const std::string& bytes) {
   try {
+    if (const std::string problem = daeProblem(bytes); !problem.empty()) return BAD + problem;
     Assimp::Importer importer;
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
     const aiScene* scene =

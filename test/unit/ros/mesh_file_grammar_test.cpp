@@ -759,6 +759,35 @@ TEST_F(DaeGrammar, WhatIsRefused) {
   }
 }
 
+/// All of this assimp reads, as something else.
+TEST_F(DaeGrammar, WhatAssimpWouldReadOtherwise) {
+  const std::string good = dae(two());
+  const auto expectBad = [&](const std::string& what, const std::string& by, const std::string& reason) {
+    ASSERT_NE(good.find(what), std::string::npos) << what;
+    std::string bad = good;
+    bad.replace(bad.find(what), what.size(), by);
+    expectRefused("a.dae", bad, "a.dae: ", reason);
+  };
+  const std::string geometry = good.substr(good.find("<geometry"), good.find("</library_geo") - good.find("<geometry"));
+  expectBad(geometry, geometry + geometry, "<geometry> has the id 'g', as another one before it");
+  expectBad(geometry, "<geometry id=\"g\"><spline/></geometry>", "no geometry of that id with a <mesh>");
+  expectBad("url=\"#g\"", "url=\"#other\"", "<instance_geometry> has the url '#other'");
+  expectBad("</node>", "<instance_node url=\"#other\"/></node>", "no node of that id");
+  expectBad("2 1 3", "2 1 -1", "<p> has '-1', which is no integer from 0 on");
+  expectBad("0.25", "0,25", "<float_array> has '0,25', which is no decimal number");
+  expectBad("1 1 0.25", "1 1", "has 11 numbers, and a count of 12");
+  expectBad("count=\"4\"", "count=\"5\"", "<accessor> goes beyond the 12 numbers of '#a'");
+  expectBad("stride=\"3\"", "stride=\"4\"", "<accessor> goes beyond");
+  for (const char* stride : {"stride=\"2\"", ""}) expectBad("stride=\"3\"", stride, "has more <param> than its stride");
+  expectBad("stride=\"3\"", "stride=\"-3\"", "<accessor> has a stride of '-3'");
+  for (const char* metres : {"0", "-1", "0,01", "nan"}) {
+    expectBad("meter=\"1\"", "meter=\"" + std::string(metres) + "\"", "<unit> has a meter of");
+  }
+  expectBad("<instance_geo", "<translate>0,5 0 0</translate><instance_geo", "<translate> has '0,5'");
+  expectBad("<instance_geo", "<matrix>1 0 0 0</matrix><instance_geo", "<matrix> must have 16 numbers");
+  expectBad("<instance_geo", "<skew>45 1 0 0 0 1 0</skew><instance_geo", "<skew> is not read");
+}
+
 // --- the page
 
 TEST(GrammarPages, EachRowIsATestAndEachTestARow) {
