@@ -68,8 +68,12 @@ class Check : public tinyxml2::XMLVisitor {
     if (name == "geometry" || name == "source" || name == "float_array" || name == "node" || name == "controller") {
       const std::string id = attribute(at, "id");
       const bool is_first = id.empty() || ids_[std::string(name)].insert(id).second;
-      // A node's name matters where another one refers to it alone; some programs give the same to several.
-      if (!is_first && name != "node") refuse(at, "has the id '" + id + "', as another one before it");
+      // A node's matters where another one refers to it alone; some programs give the same to several.
+      if (!is_first && name == "node") {
+        repeated_nodes_.insert(id);
+      } else if (!is_first) {
+        refuse(at, "has the id '" + id + "', as another one before it");
+      }
     }
     if (name == "mesh" && parent) meshes_.insert(attribute(*parent, "id"));
     if (name == "mesh") ++in_mesh_;
@@ -102,6 +106,9 @@ class Check : public tinyxml2::XMLVisitor {
       if (url.empty() || url[0] != '#' || known.count(url.substr(1)) == 0) {
         refuse(*use, "has the url '" + url + "', and the file has no " + kind + " of that id" +
                          (kind == "geometry" ? " with a <mesh>" : ""));
+      }
+      if (kind == "node" && repeated_nodes_.count(url.substr(1)) > 0) {
+        refuse(*use, "has the url '" + url + "', of several");
       }
     }
     for (const XMLElement* accessor : accessors_) {
@@ -137,8 +144,9 @@ class Check : public tinyxml2::XMLVisitor {
   }
 
   std::map<std::string, std::set<std::string>> ids_;  // by kind
-  std::set<std::string> meshes_;                      // geometries that are no splines
-  std::map<std::string, std::uint64_t> arrays_;       // how many numbers each has
+  std::set<std::string> repeated_nodes_;
+  std::set<std::string> meshes_;                 // geometries that are no splines
+  std::map<std::string, std::uint64_t> arrays_;  // how many numbers each has
   std::vector<const XMLElement*> uses_, accessors_;
   int in_mesh_ = 0;
 };

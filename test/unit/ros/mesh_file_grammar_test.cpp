@@ -773,6 +773,7 @@ TEST_F(DaeGrammar, WhatAssimpWouldReadOtherwise) {
   expectBad(geometry, "<geometry id=\"g\"><spline/></geometry>", "no geometry of that id with a <mesh>");
   expectBad("url=\"#g\"", "url=\"#other\"", "<instance_geometry> has the url '#other'");
   expectBad("</node>", "<instance_node url=\"#other\"/></node>", "no node of that id");
+  expectBad(node(), node() + node() + "<node><instance_node url=\"#n\"/></node>", "has the url '#n', of several");
   expectBad("2 1 3", "2 1 -1", "<p> has '-1', which is no integer from 0 on");
   expectBad("0.25", "0,25", "<float_array> has '0,25', which is no decimal number");
   expectBad("1 1 0.25", "1 1", "has 11 numbers, and a count of 12");
