@@ -1,13 +1,10 @@
 """The Python module: its answers are those of C++ bit for bit, it takes what numpy users have, refuses the rest with a sentence, and lets
 other threads and Ctrl-C in."""
-import ast
 import gc
-import inspect
 import math
 import os
 import pathlib
 import pickle
-import pydoc
 import re
 import signal
 import subprocess
@@ -28,7 +25,6 @@ if not SANITIZED:
     import dccd
 
 DATA = pathlib.Path(os.environ.get('DEFORMABLE_CCD_DATA', CHECKOUT.parent / 'shared/data'))
-EXAMPLES = CHECKOUT / 'examples/python'
 WRITE_STEPS = TOOLS.parents[2] / 'build/deformable_ccd/gtest/write_steps'
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
 ALL_RESULTS = ['status', 'reason', 'start_state', 'start_state_complete', 'complete', 'unchecked_toc_lower', 'earliest_toc',
@@ -634,137 +630,6 @@ class ThreadsTest(PythonTestCase):
         for thread in threads:
             thread.join()
         self.assertEqual(wrong, [])
-
-
-class PagesTest(PythonTestCase):
-    """What people and their tools read."""
-
-    def test_every_name_has_a_docstring(self):
-        for name in dccd.__all__:
-            value = getattr(dccd, name)
-            if inspect.isclass(value) or inspect.isfunction(value):
-                self.assertGreater(len(value.__doc__), 40, name)
-                for member, inner in vars(value).items() if value in vars(dccd._dccd).values() else []:
-                    if not member.startswith('_'):
-                        self.assertTrue(inner.__doc__, '%s.%s' % (name, member))
-
-    def test_pydoc_reads_well(self):
-        text = pydoc.render_doc(dccd, renderer=pydoc.plaintext)
-        self.assertNotRegex(text, r'_dccd\.|handle|std::|<object object')
-        self.assertLess(text.count('\n'), 1200)
-
-    def test_detect_names_every_option(self):
-        options = dccd.replay(CHECKOUT / 'test/fuzz/corpus/recording/one_body').options
-        said = dccd.detect.__doc__.split('Returns')[0].replace(',', ' ').split()
-        self.assertEqual([name for name in options if name not in said], [])
-        header = (CHECKOUT / 'include/dccd/detect.h').read_text().split('struct Options {')[1].split('};')[0]
-        fields = [line.split('//')[0].split('=')[0].split(';')[0].split()[-1] for line in header.splitlines()
-                  if line.startswith('  ') and not line.strip().startswith('//') and ';' in line]
-        self.assertGreater(len(fields), 15)
-        self.assertEqual(set(fields) - set(options), set(), 'what has no name there')
-
-    def test_stubs_are_those_of_the_module(self):
-        tree = ast.parse((CHECKOUT / 'python/dccd/_dccd.pyi').read_text())
-        module = dccd._dccd
-
-        def arguments(function, skip_self):
-            a = function.args
-            names = [x.arg for x in a.posonlyargs + a.args][skip_self:] + ['*' + x.arg for x in a.kwonlyargs]
-            return names + (['**' + a.kwarg.arg] if a.kwarg else [])
-
-        def parameters(callable_, skip_self):
-            found = list(inspect.signature(callable_).parameters.values())[skip_self:]
-            marks = {inspect.Parameter.KEYWORD_ONLY: '*', inspect.Parameter.VAR_KEYWORD: '**'}
-            return [marks.get(p.kind, '') + p.name for p in found]
-
-        names = set()
-        for node in tree.body:
-            if isinstance(node, ast.AnnAssign):
-                names.add(node.target.id)
-            elif isinstance(node, ast.FunctionDef):
-                names.add(node.name)
-                self.assertEqual(arguments(node, 0), parameters(getattr(module, node.name), 0), node.name)
-            elif isinstance(node, ast.ClassDef):
-                names.add(node.name)
-                value, members = getattr(module, node.name), set()
-                for inner in node.body:
-                    members.add(inner.name)
-                    words = {getattr(d, 'id', getattr(d, 'attr', '')) for d in inner.decorator_list}
-                    if words & {'property', 'setter'}:
-                        self.assertIsInstance(vars(value)[inner.name], property)
-                        self.assertEqual('setter' in words, vars(value)[inner.name].fset is not None and 'setter' in words)
-                    elif inner.name != '__iter__':
-                        skip = 0 if words else 1
-                        self.assertEqual(arguments(inner, skip), parameters(getattr(value, inner.name), skip), inner.name)
-                public = {m for m in vars(value) if not m.startswith('_') or m == '__iter__'}
-                self.assertEqual(members - {'__init__'}, public, node.name)
-        public = {n for n in vars(module) if not n.startswith('_')} | {'__version__'}
-        self.assertEqual(names, public)
-
-    def test_it_is_marked_as_typed(self):
-        installed = pathlib.Path(dccd.__file__).parent
-        self.assertTrue((installed / 'py.typed').exists() and (installed / '_dccd.pyi').exists())
-
-    def test_the_version_is_the_packages(self):
-        self.assertIn('<version>%s</version>' % dccd.__version__, (CHECKOUT / 'package.xml').read_text())
-
-
-class ExamplesTest(PythonTestCase):
-    def run_example(self, name, *arguments):
-        ran = subprocess.run([sys.executable, EXAMPLES / name, *map(str, arguments)], capture_output=True, text=True, check=False)
-        self.assertEqual((ran.returncode, ran.stderr), (0, ''))
-        return ran.stdout.splitlines()
-
-    def test_every_example_is_run_here(self):
-        self.assertEqual({p.name for p in EXAMPLES.iterdir() if p.suffix == '.py'},
-                         {'two_frames.py', 'contacts_over_time.py', 'valid_step.py', 'read_tables.py'})
-
-    def test_two_frames_say_what_the_cpp_example_says(self):
-        lines = self.run_example('two_frames.py')
-        self.assertIn('vertex-face 5 2 8 3  at 0.500000000', lines)
-        self.assertEqual(lines[-1], '5 contacts, starts CLEAR; proved, something touches anew')
-
-    def test_a_step_is_not_valid_and_two_thirds_of_it_are(self):
-        self.assertEqual(self.run_example('valid_step.py'), ['not valid', 'the largest valid step: 0.666666666'])
-
-    def test_the_largest_step_is_the_largest(self):
-        """Against the time that the geometry has, on random heights, and starts that touch."""
-        sys.path.insert(0, str(EXAMPLES))
-        self.addCleanup(sys.path.remove, str(EXAMPLES))
-        from valid_step import is_valid, largest_valid_step
-        random = np.random.default_rng(2)
-        for _ in range(50):
-            before, after = two_triangles()
-            top, bottom = random.uniform(.1, 3), random.uniform(-3, .05)
-            before[3:, 2], after[3:, 2] = top, bottom
-            part = largest_valid_step(before, after, FACES)
-            self.assertTrue(is_valid(before, before + part * (after - before), FACES))
-            self.assertAlmostEqual(part, min(1, top / (top - bottom)), delta=1e-8)
-        before[3:, 2] = 0
-        self.assertEqual(largest_valid_step(before, after, FACES), 0)
-
-    def test_tables_of_a_report(self):
-        bag = self.folder / 'scene.bag'
-        subprocess.run([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', bag, '--frames', '45', '--quiet'],
-                       stdout=subprocess.DEVNULL, check=True)
-        subprocess.run([TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet'],
-                       stdout=subprocess.DEVNULL, check=True)
-        lines = self.run_example('read_tables.py', self.folder / 'report')
-        self.assertRegex(lines[0], r'^\d+ of \d+ steps are clear$')
-        self.assertRegex(lines[-1], r'^mesh +octomap +\d+ +\d+ +\d')
-
-    def test_contacts_over_time(self):
-        frames = self.folder / 'frames'
-        frames.mkdir()
-        t0, _ = two_triangles()
-        for i in range(5):
-            t0[3:, 2] = 1 - .4 * i
-            meshio.write(frames / ('%02d.ply' % i), meshio.Mesh(t0, [('triangle', FACES.astype('i4'))]))
-        lines = self.run_example('contacts_over_time.py', frames, self.folder / 'contacts.png', 10)
-        self.assertEqual(len(lines), 4)
-        self.assertEqual(lines[0], '0.100 s: proved, nothing touches')
-        self.assertEqual(lines[2], '0.300 s: proved, something touches anew')
-        self.assertEqual((self.folder / 'contacts.png').read_bytes()[1:4], b'PNG')
 
 
 if __name__ == '__main__':
