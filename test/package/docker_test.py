@@ -99,6 +99,24 @@ def missing():
     return ''
 
 
+class LinesTest(unittest.TestCase):
+    """What linters of Dockerfiles ask for."""
+
+    def test_lines(self):
+        for path in (MONITOR, DEMO):
+            found = instructions(path)
+            self.assertEqual(found[0][0], 'FROM')
+            self.assertEqual(found[-1][0], 'CMD')
+            self.assertIsInstance(json.loads(found[-1][1]), list)  # no shell between the container and its program
+            for word, rest in found:
+                with self.subTest('%s: %s %s' % (path.name, word, rest)):
+                    self.assertIn(word, ('FROM', 'ENV', 'WORKDIR', 'COPY', 'RUN', 'CMD'))
+                    if word == 'FROM':
+                        self.assertRegex(rest, r'^\w+:(?!latest)\S+')
+                    if 'apt-get' in rest:
+                        self.assertRegex(rest, r'^apt-get update && apt-get install -y --no-install-recommends .* && rm -rf .*/var/lib/apt/lists/\*$')
+
+
 @unittest.skipIf(missing(), missing())
 class ImagesTest(unittest.TestCase):
     @classmethod
