@@ -38,7 +38,7 @@ struct MeshFrame {
 };
 
 struct MeshStoreOptions {
-  double max_step_s = tolerance::LONGEST_STEP_S;  ///< a longer pause is a gap; > 0
+  double max_step_s = tolerance::LONGEST_STEP_S;  ///< a longer pause is a gap; above 0, at most 1e9
   double max_vertex_step_m =
       tolerance::FARTHEST_VERTEX_STEP_M;  ///< a vertex that moves further is a teleport; 0: never
   std::size_t capacity = 1024;            ///< frames kept at most; at least 2

@@ -29,7 +29,7 @@ struct MonitorOptions {
   /// How much older than its stamp what a map shows may be, for the bodies' own voxels [s].
   double own_voxels_lag_s = 0.1;
   bool own_voxels_trust = false;  ///< what the first map shows where a body is, is its own
-  double look_ahead_s = 0;        ///< horizon of predictions; 0: none
+  double look_ahead_s = 0;        ///< horizon of predictions, at most 1e8; 0: none
   /// A patch that comes back within this is the same one; of steps that were answered whole. With
   /// detector.patches.
   double patch_gap_s = tolerance::PATCH_GAP_S;

@@ -19,7 +19,11 @@ using Edge = std::array<Index, 2>;  ///< vertex indices, the smaller one first
 using Face = std::array<Index, 3>;  ///< vertex indices in the order of the input
 using Positions = std::vector<Vec3>;
 using StampNs = std::int64_t;  ///< nanoseconds; the stamp of a mesh, never the wall clock
-inline double secondsBetween(StampNs from_ns, StampNs to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; }
+inline double secondsBetween(StampNs from_ns, StampNs to_ns) {
+  // Unsigned, for two stamps can be further apart than the largest of them.
+  const auto from = static_cast<std::uint64_t>(from_ns), to = static_cast<std::uint64_t>(to_ns);
+  return (to_ns < from_ns ? -static_cast<double>(from - to) : static_cast<double>(to - from)) * 1e-9;
+}
 
 /// A closed axis-aligned box.
 struct Box {

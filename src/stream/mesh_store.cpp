@@ -13,8 +13,9 @@ namespace dccd {
 namespace {
 
 void check(const MeshStoreOptions& options) {
-  if (!(options.max_step_s > 0) || !std::isfinite(options.max_step_s)) {
-    throw std::invalid_argument("max_step_s must be finite and above 0, is " + std::to_string(options.max_step_s));
+  // No step is too long for its nanoseconds to be counted.
+  if (!(options.max_step_s > 0 && options.max_step_s <= 1e9)) {
+    throw std::invalid_argument("max_step_s must be above 0 and at most 1e9, is " + std::to_string(options.max_step_s));
   }
   if (!(options.max_vertex_step_m >= 0)) {
     throw std::invalid_argument("max_vertex_step_m must be 0 (off) or more, is " +

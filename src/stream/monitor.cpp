@@ -23,8 +23,8 @@ void checkStream(const MonitorOptions& options, std::size_t bodies) {
           "sync_timeout_s must be finite and 0 or more, is " + std::to_string(options.sync_timeout_s));
   require(options.max_waiting >= 1, "max_waiting must be 1 or more");
   require(options.octomap_timeout_s >= 0, "octomap_timeout_s must be 0 (never) or more");
-  require(options.look_ahead_s >= 0 && std::isfinite(options.look_ahead_s),
-          "look_ahead_s must be finite and 0 (off) or more, is " + std::to_string(options.look_ahead_s));
+  require(options.look_ahead_s >= 0 && options.look_ahead_s <= 1e8,
+          "look_ahead_s must be 0 (off) to 1e8, is " + std::to_string(options.look_ahead_s));
   require(options.own_voxels_lag_s >= 0 && options.own_voxels_lag_s <= tolerance::OWN_PATH_S,
           "own_voxels_lag_s must be 0 to " + std::to_string(static_cast<int>(tolerance::OWN_PATH_S)) + ", is " +
               std::to_string(options.own_voxels_lag_s));

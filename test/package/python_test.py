@@ -315,7 +315,7 @@ class StreamTest(PythonTestCase):
     def test_refusals(self):
         with self.assertRaisesRegex(TypeError, "there is no option 'max_steps'"):
             self.stream(max_steps=1)
-        with self.assertRaisesRegex(ValueError, 'max_step_s must be finite and above 0'):
+        with self.assertRaisesRegex(ValueError, 'max_step_s must be above 0 and at most 1e9'):
             self.stream(max_step_s=0)
         with self.assertRaisesRegex(ValueError, "no body is called 'rope'"):
             self.stream().push(two_triangles()[0], 0, 'rope')

@@ -6,6 +6,7 @@ import functools
 import itertools
 import json
 import os
+import re
 import subprocess
 import unittest
 
@@ -232,6 +233,15 @@ class MakeSceneBagTest(FolderTestCase):
                 for part in ('bad.yaml', where.format(line=line), instead):
                     self.assertIn(part, result.stderr)
                 self.assertFalse(bag.exists(), 'nothing is recorded')
+
+    def test_a_rate_that_makes_more_frames_than_a_scene_may_have_is_refused(self):
+        long = self.folder / 'long.yaml'
+        text = self.SCENE.read_text()
+        frames = re.search('^frames: .*$', text, re.MULTILINE).group(0)
+        long.write_text(text.replace(frames, 'frames: 1000000'))
+        result = run(TOOLS / 'make_scene_bag', long, self.folder / 'g.bag', '--rate', '1000')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('--rate is too high for a scene of', result.stderr)
 
     def test_a_bag_that_cannot_be_written_is_an_error(self):
         result = run(TOOLS / 'make_scene_bag', self.SCENE, self.folder / 'no' / 'such' / 'f.bag', '--frames', '2')

@@ -170,9 +170,12 @@ class CameraRecorder {
 /// The same time in frames of another length; physics takes no longer steps than before.
 void overrideRate(scene::SceneSpec& spec, double rate_hz) {
   const double steps_hz = spec.frame_rate_hz * spec.substeps, duration_s = (spec.frames - 1) / spec.frame_rate_hz;
-  spec.frames = static_cast<int>(std::lround(duration_s * rate_hz)) + 1;
-  if (spec.frames < 2)
-    throw std::runtime_error("--rate is too low for a scene of " + std::to_string(duration_s) + " s");
+  const double steps = std::round(duration_s * rate_hz);
+  if (!(steps >= 1 && steps < 1e6)) {
+    throw std::runtime_error("--rate is too " + std::string(steps < 1 ? "low" : "high") + " for a scene of " +
+                             std::to_string(duration_s) + " s");
+  }
+  spec.frames = static_cast<int>(steps) + 1;
   spec.substeps = static_cast<int>(std::ceil(steps_hz / rate_hz));
   spec.frame_rate_hz = rate_hz;
 }

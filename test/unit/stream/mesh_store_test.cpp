@@ -40,6 +40,16 @@ TEST_F(MeshStoreTest, SaysWhatAFrameIsToTheOneBeforeIt) {
   EXPECT_EQ(store.push(frame(1280 * MS, 1.1)), StepStatus::OK);
 }
 
+// Their difference is more than a stamp can be.
+TEST_F(MeshStoreTest, StampsOfAnySizeTellAGap) {
+  constexpr StampNs LEAST = std::numeric_limits<StampNs>::min(), MOST = std::numeric_limits<StampNs>::max();
+  store.push(frame(LEAST));
+  EXPECT_EQ(store.push(frame(MOST)), StepStatus::GAP);
+  EXPECT_EQ(secondsBetween(LEAST, MOST), 0x1p64 * 1e-9);
+  EXPECT_EQ(secondsBetween(MOST, LEAST), -0x1p64 * 1e-9);
+  EXPECT_EQ(secondsBetween(-5, 7), 12 * 1e-9);
+}
+
 TEST_F(MeshStoreTest, RefusesAVertexCountThatDoesNotFit) {
   store.push(frame(0));
   MeshFrame wrong = frame(10 * MS);
@@ -146,6 +156,7 @@ TEST(MeshStoreOptionsTest, OutOfRangeNamesTheOption) {
   };
   EXPECT_NE(message({0, 0.5, 4}).find("max_step_s"), std::string::npos);
   EXPECT_NE(message({std::nan(""), 0.5, 4}).find("max_step_s"), std::string::npos);
+  EXPECT_NE(message({2e9, 0.5, 4}).find("max_step_s"), std::string::npos);
   EXPECT_NE(message({0.1, -1, 4}).find("max_vertex_step_m"), std::string::npos);
   EXPECT_NE(message({0.1, 0.5, 1}).find("capacity"), std::string::npos);
 }

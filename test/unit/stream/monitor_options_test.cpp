@@ -32,6 +32,9 @@ TEST(MonitorOptionsTest, OutOfRangeNamesTheOption) {
   options.sync_timeout_s = -1;
   EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
   options = {};
+  options.look_ahead_s = 2e8;
+  EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
+  options = {};
   options.clock_body = 1;
   EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
   options = {};
