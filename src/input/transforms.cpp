@@ -107,6 +107,12 @@ void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, c
   if (told_.insert(child).second) complaints_.push_back(text);
 }
 
+void TransformFeed::leaveOut(const std::string& problem) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++unusable_;
+  complaints_.push_back(problem);
+}
+
 std::string TransformFeed::noTransform(const std::string& from, const std::string& to, const std::string& why) const {
   const std::string unusable = onlyUnusable();
   return "no transform from '" + from + "' to " + to + ": " + shortText(why) +

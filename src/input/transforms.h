@@ -60,6 +60,8 @@ class TransformFeed {
   std::string noTransform(const std::string& from, const std::string& to, const std::string& why) const;
   /// Which frames have had no others, and why, in words; empty: none.
   std::string onlyUnusable() const;
+  /// Counts a message of which nothing can be read, and complains of it.
+  void leaveOut(const std::string& problem);
   /// A line for each child frame that has had an unusable one, once.
   std::vector<std::string> takeComplaints();
 

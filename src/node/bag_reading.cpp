@@ -6,7 +6,10 @@
 #include <stdexcept>
 #include <vector>
 
+#include <boost/make_shared.hpp>
+
 #include "dccd/regular_file.h"
+#include "input/message_bytes.h"
 #include "input/short_text.h"
 
 namespace dccd {
@@ -17,6 +20,7 @@ const ros::Duration TF_AHEAD(10.0);
 const ros::Duration TF_KEPT(60.0);
 // Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
 const ros::Duration SEAM(1.0);
+constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
 
 }  // namespace
 
@@ -49,13 +53,32 @@ TransformWindow::TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
       next_static_(statics_.begin()) {
   std::set<std::string> known;
   for (const rosbag::MessageInstance& m : statics_) {
-    const auto tf = m.instantiate<tf2_msgs::TFMessage>();
+    const auto tf = read(m);
     if (!tf) continue;
     tf2_msgs::TFMessage firsts;
     for (const auto& transform : tf->transforms) {
       if (known.insert(transform.child_frame_id).second) firsts.transforms.push_back(transform);
     }
     feed_.add(firsts, true);
+  }
+}
+
+tf2_msgs::TFMessage::ConstPtr TransformWindow::read(const rosbag::MessageInstance& message) {
+  if (!message.isType<tf2_msgs::TFMessage>()) return nullptr;
+  std::vector<std::uint8_t> bytes = bytesOf(message);
+  const auto size = static_cast<std::uint32_t>(bytes.size());
+  try {
+    std::uint32_t count = 0;
+    ros::serialization::IStream(bytes.data(), size).next(count);
+    // roscpp makes room for as many as the message claims before it reads the first.
+    if (count > bytes.size() / LEAST_TRANSFORM) ros::serialization::throwStreamOverrun();
+    const auto tf = boost::make_shared<tf2_msgs::TFMessage>();
+    ros::serialization::IStream stream(bytes.data(), size);
+    ros::serialization::deserialize(stream, *tf);
+    return tf;
+  } catch (const ros::serialization::StreamOverrunException&) {
+    feed_.leaveOut("a message on " + message.getTopic() + " is damaged and left out");
+    return nullptr;
   }
 }
 
@@ -75,10 +98,10 @@ void TransformWindow::meshComes(std::size_t body, StampNs stamp_ns, const ros::T
 
 void TransformWindow::feedUntil(const ros::Time& at) {
   for (; next_static_ != statics_.end() && next_static_->getTime() <= at; ++next_static_) {
-    if (const auto tf = next_static_->instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);
+    if (const auto tf = read(*next_static_)) feed_.add(*tf, true);
   }
   for (; next_ != view_.end() && next_->getTime() <= at + TF_AHEAD; ++next_) {
-    if (!waiting_) waiting_ = next_->instantiate<tf2_msgs::TFMessage>();
+    if (!waiting_) waiting_ = read(*next_);
     // Where the meshes never go back, its turn comes all the same.
     const ros::Time recorded = next_->getTime();
     const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);

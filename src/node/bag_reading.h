@@ -28,6 +28,9 @@ class TransformWindow {
   void feedUntil(const ros::Time& at);
 
  private:
+  /// None of what is no TFMessage, and of one that is damaged, which the feed hears.
+  tf2_msgs::TFMessage::ConstPtr read(const rosbag::MessageInstance& message);
+
   TransformFeed& feed_;
   rosbag::View view_, statics_;
   rosbag::View::iterator next_, next_static_;

@@ -1,4 +1,7 @@
 """Bags that analyze_bag cannot open: one line with the file's name and the remedy, exit status 1; and the remedy helps."""
+import io
+import os
+import resource
 import shutil
 import struct
 import subprocess
@@ -6,6 +9,7 @@ import unittest
 
 import rosbag
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
@@ -20,6 +24,11 @@ def cloud(stamp_s, frame='world'):
     message.fields = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate('xyz')]
     message.data = b''.join(struct.pack('<3f', 0.1 * (i % 2), 0.1 * (i // 2), 0.0) for i in range(4))
     return message
+
+
+def limited():
+    if not os.environ.get('DEFORMABLE_CCD_SANITIZED'):  # sanitizers map more at the start
+        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 
 
 class DamagedBagTest(FolderTestCase):
@@ -76,6 +85,43 @@ class DamagedBagTest(FolderTestCase):
         other = self.folder / 'other.bag'
         other.write_text('v 0 0 0\n' * 1000)
         self.assertIn("the file is no bag: it does not begin with '#ROSBAG V'", self.refused(other))
+
+    def test_transforms_that_are_none(self):
+        """A damaged message is left out, whatever it claims to hold: not the run, nor all of the memory."""
+        params, bytes_of_one = self.folder / 'world.yaml', io.BytesIO()
+        params.write_text('fixed_frame: world\n')
+        placed = TransformStamped(child_frame_id='camera')
+        placed.header.frame_id, placed.header.stamp, placed.transform.rotation.w = 'world', rospy.Time.from_sec(100), 1
+        TFMessage([placed]).serialize(bytes_of_one)
+        for topic in ('/tf', '/tf_static'):
+            for count in (2, 0x4000001, 0xffffffff):
+                path, damaged = self.folder / 'tf.bag', struct.pack('<I', count) + bytes_of_one.getvalue()[4:]
+                with rosbag.Bag(str(path), 'w') as bag:
+                    for k in range(3):
+                        bag.write('/cloth', cloud(100 + 0.1 * k, 'camera'), rospy.Time.from_sec(100 + 0.1 * k))
+                    bag.write('/tf_static', TFMessage([placed]), rospy.Time.from_sec(100))
+                    for data in (damaged, damaged[:2]):
+                        bag.write(topic, ('tf2_msgs/TFMessage', data, TFMessage._md5sum, TFMessage), rospy.Time.from_sec(100.05), raw=True)
+                command = [str(TOOLS / 'analyze_bag'), str(path), '--mesh', '/cloth', '--params', str(params), '--report',
+                           str(self.folder / 'report'), '--quiet']
+                ran = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, preexec_fn=limited)
+                with self.subTest(topic=topic, count=count):
+                    self.assertEqual(ran.returncode, 0, ran.stderr)
+                    self.assertIn('tf: a message on %s is damaged and left out' % topic, ran.stderr)
+
+    def test_diagnostics_that_are_none(self):
+        path, result, damaged = self.folder / 'diagnostics.bag', self.folder / 'result.bag', 12 * b'\0' + struct.pack('<II', 0, 7)
+        with rosbag.Bag(str(path), 'w') as bag:
+            for k in range(3):
+                bag.write('/cloth', cloud(100 + 0.1 * k), rospy.Time.from_sec(100 + 0.1 * k))
+            bag.write('/diagnostics', ('diagnostic_msgs/DiagnosticArray', damaged, DiagnosticArray._md5sum, DiagnosticArray),
+                      rospy.Time.from_sec(100.05), raw=True)
+        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(path), '--mesh', '/cloth', '-o', str(result), '--report',
+                              str(self.folder / 'report'), '--quiet'],
+                             capture_output=True, text=True, check=False, timeout=60)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        with rosbag.Bag(str(result)) as bag:
+            self.assertIn(damaged, [m[1] for _, m, _ in bag.read_messages(topics=['/diagnostics'], raw=True)])
 
     def test_a_quaternion_that_is_none(self):
         """The reason of the frame without a place, and the complaint, name it."""

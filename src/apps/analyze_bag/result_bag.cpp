@@ -45,9 +45,13 @@ void ResultBag::copy(const rosbag::MessageInstance& m, const MonitorPipeline& pi
   bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
 }
 
-/// False where the message holds nothing of a monitor of this name.
+/// False where the message holds nothing of a monitor of this name, or nothing that can be read.
 bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
-  const auto recorded = m.instantiate<diagnostic_msgs::DiagnosticArray>();
+  diagnostic_msgs::DiagnosticArray::ConstPtr recorded;
+  try {
+    recorded = m.instantiate<diagnostic_msgs::DiagnosticArray>();
+  } catch (const std::exception&) {  // it is damaged, or claims to be larger than all of the memory
+  }
   if (!recorded) return false;
   diagnostic_msgs::DiagnosticArray others = *recorded;
   const auto own = std::remove_if(others.status.begin(), others.status.end(),
