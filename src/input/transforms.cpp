@@ -7,8 +7,10 @@
 #include <utility>
 
 #include <geometry_msgs/TransformStamped.h>
+#include <ros/serialization.h>
 #include <tf2/exceptions.h>
 #include <Eigen/Geometry>
+#include <boost/make_shared.hpp>
 
 #include "input/short_text.h"
 
@@ -18,6 +20,7 @@ namespace {
 
 // tf2 follows no longer chain.
 constexpr std::size_t MAX_CHAIN = 1000;
+constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
 
 ros::Time toTime(StampNs stamp_ns) {
   ros::Time time;
@@ -107,10 +110,24 @@ void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, c
   if (told_.insert(child).second) complaints_.push_back(text);
 }
 
-void TransformFeed::leaveOut(const std::string& problem) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  ++unusable_;
-  complaints_.push_back(problem);
+tf2_msgs::TFMessage::ConstPtr TransformFeed::read(const std::string& topic, std::vector<std::uint8_t> bytes) {
+  using ros::serialization::IStream;
+  const auto size = static_cast<std::uint32_t>(bytes.size());
+  try {
+    std::uint32_t count = 0;
+    IStream(bytes.data(), size).next(count);
+    // roscpp makes room for as many as there are said to be before it reads the first.
+    if (count > size / LEAST_TRANSFORM) ros::serialization::throwStreamOverrun();
+    const auto message = boost::make_shared<tf2_msgs::TFMessage>();
+    IStream stream(bytes.data(), size);
+    ros::serialization::deserialize(stream, *message);
+    return message;
+  } catch (const ros::serialization::StreamOverrunException&) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++unusable_;
+    if (told_.insert(topic).second) complaints_.push_back("a message on " + topic + " is damaged and left out");
+    return nullptr;
+  }
 }
 
 std::string TransformFeed::noTransform(const std::string& from, const std::string& to, const std::string& why) const {

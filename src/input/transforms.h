@@ -37,6 +37,8 @@ class TransformFeed {
   static constexpr std::size_t MAX_TOLD = 16;
 
   explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
+  /// What these bytes of the topic are. Null where they do not hold what they say, which is counted as unusable.
+  tf2_msgs::TFMessage::ConstPtr read(const std::string& topic, std::vector<std::uint8_t> bytes);
   /// Whether add() would clear the buffer.
   bool clears(const tf2_msgs::TFMessage& message, bool is_static) const;
   /// Returns true when the buffer was cleared.
@@ -60,8 +62,6 @@ class TransformFeed {
   std::string noTransform(const std::string& from, const std::string& to, const std::string& why) const;
   /// Which frames have had no others, and why, in words; empty: none.
   std::string onlyUnusable() const;
-  /// Counts a message of which nothing can be read, and complains of it.
-  void leaveOut(const std::string& problem);
   /// A line for each child frame that has had an unusable one, once.
   std::vector<std::string> takeComplaints();
 

@@ -6,8 +6,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include <boost/make_shared.hpp>
-
 #include "dccd/regular_file.h"
 #include "input/message_bytes.h"
 #include "input/short_text.h"
@@ -20,7 +18,6 @@ const ros::Duration TF_AHEAD(10.0);
 const ros::Duration TF_KEPT(60.0);
 // Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
 const ros::Duration SEAM(1.0);
-constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
 
 }  // namespace
 
@@ -65,21 +62,7 @@ TransformWindow::TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
 
 tf2_msgs::TFMessage::ConstPtr TransformWindow::read(const rosbag::MessageInstance& message) {
   if (!message.isType<tf2_msgs::TFMessage>()) return nullptr;
-  std::vector<std::uint8_t> bytes = bytesOf(message);
-  const auto size = static_cast<std::uint32_t>(bytes.size());
-  try {
-    std::uint32_t count = 0;
-    ros::serialization::IStream(bytes.data(), size).next(count);
-    // roscpp makes room for as many as the message claims before it reads the first.
-    if (count > bytes.size() / LEAST_TRANSFORM) ros::serialization::throwStreamOverrun();
-    const auto tf = boost::make_shared<tf2_msgs::TFMessage>();
-    ros::serialization::IStream stream(bytes.data(), size);
-    ros::serialization::deserialize(stream, *tf);
-    return tf;
-  } catch (const ros::serialization::StreamOverrunException&) {
-    feed_.leaveOut("a message on " + message.getTopic() + " is damaged and left out");
-    return nullptr;
-  }
+  return feed_.read(message.getTopic(), bytesOf(message));
 }
 
 ros::Duration TransformWindow::length() { return TF_KEPT + TF_AHEAD; }

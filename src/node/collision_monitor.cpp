@@ -101,8 +101,8 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
-void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) try {
-  feed.add(message, is_static);
+void CollisionMonitor::Impl::onTransforms(const ShapeShifter& bytes, bool is_static) try {
+  if (const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(bytes))) feed.add(*message, is_static);
   for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
   tellLost(is_static ? "/tf_static" : "/tf", error);
@@ -126,18 +126,23 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) try {
 void CollisionMonitor::Impl::subscribe() {
   ros::NodeHandle input(node);
   input.setCallbackQueue(&input_callbacks);
-  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   mesh_subscriptions.resize(config.bodies.size());
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (config.bodies[b].isRigid()) continue;
     mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
         input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
-  tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { onTransforms(*m, false); },
-      ros::VoidConstPtr(), hints);
-  tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { onTransforms(*m, true); });
+  const auto listenTo = [&](const std::string& topic, bool is_static) {
+    ros::SubscribeOptions options;
+    options.init<ShapeShifter>(topic, SUBSCRIBER_QUEUE,
+                               [this, is_static](const ShapeShifter::ConstPtr& m) { onTransforms(*m, is_static); });
+    options.md5sum = ros::message_traits::md5sum<tf2_msgs::TFMessage>();
+    options.datatype = ros::message_traits::datatype<tf2_msgs::TFMessage>();
+    options.transport_hints = ros::TransportHints().tcpNoDelay();
+    return input.subscribe(options);
+  };
+  tf_subscriber = listenTo("/tf", false);
+  tf_static_subscriber = listenTo("/tf_static", true);
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });

@@ -84,7 +84,7 @@ struct CollisionMonitor::Impl {
   // Input thread.
   void subscribe();
   void onMesh(std::size_t body, MeshMessage message);
-  void onTransforms(const tf2_msgs::TFMessage& message, bool is_static);
+  void onTransforms(const topic_tools::ShapeShifter& bytes, bool is_static);
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
 
   // Service thread.

@@ -1,13 +1,15 @@
 """Much of what is small: points that coincide, frames of tf, topologies, maps, services, connections. Memory and log stay, and what is
 good afterwards is answered."""
 import os
+import struct
 import time
 import unittest
 
 import rospy
-from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, octomap, peak_kb, resident_kb
+from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, octomap, peak_kb, resident_kb, wait_for
 from deformable_ccd.msg import ContactArray, MeshStamped
 from geometry_msgs.msg import TransformStamped
+from live_node import bytes_of, raw
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
@@ -74,6 +76,18 @@ class FloodsTest(AttackTest):
                 batch.append(one)
             tf.publish(TFMessage(batch))
         time.sleep(1)
+        self.holds(2)
+
+    def test_transforms_that_are_none(self):
+        """Few bytes that claim to be 16 million transforms, which would take 2 GB."""
+        self.start('no_tf')
+        whole = TransformStamped(child_frame_id='camera')
+        whole.header.frame_id, whole.transform.rotation.w = 'world', 1.0
+        for topic in ('/tf', '/tf_static'):
+            tf = self.advertise(topic, TFMessage)
+            for _ in range(20):
+                tf.publish(raw(TFMessage, struct.pack('<I', 0x1000001) + bytes_of(TFMessage([whole]))[4:]))
+        wait_for(lambda: sum('is damaged and left out' in line for line in self.log_lines()) == 2, 60, 'a line for each topic')
         self.holds(2)
 
     def test_a_topology_a_frame(self):
