@@ -21,6 +21,10 @@ std::string textOf(const std::vector<py::ssize_t>& shape) {
 }
 
 py::array checkedArray(py::handle value, const std::string& name, const char* kinds, const std::string& wanted) {
+  // An array is also what lies under a mask, which is nobody's number.
+  if (py::hasattr(value, "mask") && py::module_::import("numpy.ma").attr("is_masked")(value).cast<bool>()) {
+    throw py::value_error(name + " has masked elements; filled(numpy.nan) makes them positions that are not known");
+  }
   py::array array = py::array::ensure(value);
   if (!array) throw py::type_error(name + " is no array; " + wanted);
   // An empty list is float64 to numpy, whatever it is a list of.

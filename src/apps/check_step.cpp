@@ -2,9 +2,11 @@
 // it says is proved (contacts or none), with 3 when it is not, with 1 on an error.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -89,9 +91,10 @@ struct Times {
 struct Run {
   Options options;
   History history;
-  Outcome result;                              // of the last step
-  Assurance assurance;                         // of the first step that is not proved, or the last one
-  StepStats sum;                               // over the steps
+  Outcome result;           // of the last step
+  Assurance assurance;      // of the first step that is not proved, or the last one; what touches in any
+  double earliest_toc = 0;  // steps after the first frame
+  StepStats sum;            // over the steps
   std::vector<std::vector<Contact>> contacts;  // per step
   std::map<std::string, Times> times;
 
@@ -103,6 +106,8 @@ struct Run {
   void once(const std::vector<Step>& steps, ProgressBar& progress) {
     contacts.clear();
     sum = StepStats();
+    earliest_toc = std::numeric_limits<double>::infinity();
+    Touching touching = Touching::NONE;
     if (steps.size() > 1) history.clear();
     for (const Step& step : steps) {
       result = detect(step, options, history);
@@ -112,9 +117,15 @@ struct Run {
         times[toString(static_cast<Stage>(s))].ms.push_back(result.stats.stages[s].ms);
       }
       times["total"].ms.push_back(result.stats.total_ms);
-      if (contacts.size() == 1 || assurance.proved) assurance = assuranceOf(result);
+      const Assurance of_step = assuranceOf(result);
+      touching = std::max(touching, of_step.touching);
+      if (contacts.size() == 1 || assurance.proved) assurance = of_step;
+      if (result.earliest_toc <= 1) {
+        earliest_toc = std::min(earliest_toc, static_cast<double>(contacts.size() - 1) + result.earliest_toc);
+      }
       progress.advance();
     }
+    assurance.touching = touching;
   }
 };
 
@@ -147,7 +158,7 @@ nlohmann::json statsJson(const Arguments& a, const Run& run) {
   j["simd_target"] = simdTarget();
   j["accuracy"] = a.accuracy;
   j["contacts"] = run.contactCount();
-  // Of the first step that is not proved, else of the last; then of the last.
+  // Of all steps; then of the last.
   j["proved"] = run.assurance.proved;
   j["missing"] = run.assurance.missing;
   j["touching"] = toString(run.assurance.touching);
@@ -162,11 +173,10 @@ void print(const Arguments& a, const Run& run) {
   std::cout << std::left << std::setw(14) << "accuracy" << std::right << std::setw(10) << "contacts" << std::setw(11)
             << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
             << "median ms" << '\n';
-  const double earliest = run.result.earliest_toc;
   std::cout << std::left << std::setw(14) << a.accuracy << std::right << std::setw(10) << run.contactCount()
             << std::setw(11) << run.sum.undecided << std::setw(14);
-  if (earliest <= 1)
-    std::cout << earliest;
+  if (std::isfinite(run.earliest_toc))
+    std::cout << run.earliest_toc;
   else
     std::cout << "none";
   std::cout << std::fixed << std::setprecision(2) << std::setw(11) << run.times.at("total").best() << std::setw(11)

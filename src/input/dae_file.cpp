@@ -69,6 +69,7 @@ std::string answerOf(const std::string& bytes) {
     if (const std::string problem = daeProblem(bytes); !problem.empty()) return BAD + problem;
     Assimp::Importer importer;
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+    importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);  // else its nodes, where there is no mesh
     const aiScene* scene =
         importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_ValidateDataStructure, "dae");
     if (!scene || !scene->mRootNode) return BAD + std::string(importer.GetErrorString());

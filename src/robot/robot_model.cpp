@@ -57,6 +57,7 @@ class RobotMaker {
       return std::move(robot_);
     }
     robot_.known = true;
+    for (const std::string& shape : urdf.unread) miss("not watched: " + shape);
     for (const auto& link : urdf.model->links_) robot_.links.push_back(link.first);
     if (!semantic.name.empty()) readSemantic(semantic, *urdf.model);
     findLeftOut();

@@ -40,8 +40,28 @@ class HeardErrors : public console_bridge::OutputHandler {
   std::string said_;
 };
 
+/// The shapes where no URDF has one, as in a <Link>: nobody would read them. Simulators have shapes of their own.
+void listUnread(const XMLElement& at, const XMLElement& robot, std::vector<std::string>& unread) {
+  const std::string name = at.Name();
+  const XMLElement* link = at.Parent()->ToElement();
+  const bool of_link = (name == "collision" || name == "visual") && link && std::string(link->Name()) == "link" &&
+                       link->Parent() == &robot;
+  for (const XMLElement* child = at.FirstChildElement(); child; child = child->NextSiblingElement()) {
+    const std::string tag = child->Name();
+    if (tag == "geometry" && !of_link) {
+      unread.push_back("a <geometry> in " + placeOf(at) + ", where no URDF has one");
+    } else if (tag != "gazebo") {
+      listUnread(*child, robot, unread);
+    }
+  }
+}
+
 /// What is wrong with a collision element; empty: urdfdom knows it.
 std::string problemOf(const XMLElement& collision) {
+  for (const char* const single : {"origin", "geometry"}) {
+    const XMLElement* first = collision.FirstChildElement(single);
+    if (first && first->NextSiblingElement(single)) return std::string("has more than one <") + single + ">";
+  }
   const XMLElement* origin = collision.FirstChildElement("origin");
   if (origin && origin->Attribute("quat_xyzw")) {
     return "has an origin with quat_xyzw, which URDF readers before urdfdom 5.1 pass over; write rpy";
@@ -49,6 +69,7 @@ std::string problemOf(const XMLElement& collision) {
   const XMLElement* geometry = collision.FirstChildElement("geometry");
   const XMLElement* shape = geometry ? geometry->FirstChildElement() : nullptr;
   if (!shape) return "has no geometry";
+  if (shape->NextSiblingElement()) return "has more than one shape; write a collision element for each";
   const std::string name = shape->Name();
   for (const char* known : {"box", "cylinder", "sphere", "mesh"}) {
     if (name == known) return "";
@@ -104,6 +125,7 @@ UrdfText parseUrdf(const std::string& text, bool visuals) {
   UrdfText urdf;
   tinyxml2::XMLDocument document;
   XMLElement& robot = parseRobotXml(text, document);
+  listUnread(robot, robot, urdf.unread);
   std::map<std::string, std::size_t> elements;  // of each link
   for (XMLElement *child = robot.FirstChildElement(), *next = nullptr; child; child = next) {
     next = child->NextSiblingElement();

@@ -21,6 +21,7 @@ struct UrdfText {
   urdf::ModelInterfaceSharedPtr model;  ///< its links with their collision elements; its joints are all fixed
   /// By link: collision elements that are no geometry that is known, a clause each. They are not in the model.
   std::map<std::string, std::vector<std::string>> refused;
+  std::vector<std::string> unread;    ///< shapes that are of no link's elements, a clause each
   std::set<std::string> visual_only;  ///< links that are seen, but have no collision element
 };
 

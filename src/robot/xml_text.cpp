@@ -1,8 +1,21 @@
 #include "robot/xml_text.h"
 
+#include <cstring>
+
 #include "robot/urdf_text.h"
 
 namespace dccd {
+namespace {
+
+/// What waits for xacro says nothing yet, and would be passed over with all that is in it.
+void requireExpanded(const tinyxml2::XMLElement& element) {
+  if (std::strncmp(element.Name(), "xacro:", 6) == 0) {
+    throw RobotTextError("has " + placeOf(element) + ", so that xacro has not expanded it yet");
+  }
+  for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) requireExpanded(*child);
+}
+
+}  // namespace
 
 tinyxml2::XMLElement& parseRobotXml(const std::string& text, tinyxml2::XMLDocument& document) {
   document.Parse(text.data(), text.size());
@@ -15,6 +28,7 @@ tinyxml2::XMLElement& parseRobotXml(const std::string& text, tinyxml2::XMLDocume
   if (std::string(root->Name()) != "robot") {
     throw RobotTextError("begins with " + placeOf(*root) + ", where <robot> is needed");
   }
+  requireExpanded(*root);
   return *root;
 }
 

@@ -332,6 +332,9 @@ class ArraysTest(PythonTestCase):
         self.t0, self.t1 = two_triangles()
         self.wanted = dccd.detect(dccd.Body(self.t0, self.t1, FACES)).contacts
 
+    def test_a_mask_that_hides_nothing_is_none(self):
+        self.assertEqual(dccd.Body(np.ma.array(self.t0), self.t1, np.ma.array(FACES)).t0.tolist(), self.t0.tolist())
+
     def test_any_layout_gives_the_same(self):
         padded = np.zeros((6, 5))
         padded[:, 1:4] = self.t0
@@ -439,6 +442,8 @@ class ArraysTest(PythonTestCase):
                 ((t0.astype(str), t1, FACES), TypeError, 't0 has dtype <U'),
                 (([['a', None, {}]], t1, FACES), TypeError, 't0 has dtype object'),
                 (([[1, 2, 3], [1, 2]], t1, FACES), TypeError, 't0 is no array|t0 has dtype object'),
+                ((np.ma.masked_equal(t0, t0[4, 1]), t1, FACES), ValueError, 't0 has masked elements'),
+                ((t0, t1, np.ma.masked_equal(FACES, 5)), ValueError, 'triangles has masked elements'),
                 ((t0[:, :2], t1, FACES), ValueError, r't0 has shape \(6, 2\), expected \(n, 3\)'),
                 ((t0.ravel(), t1, FACES), ValueError, r't0 has shape \(18,\), expected \(n, 3\)'),
                 ((t0, t1[:5], FACES), ValueError, 't1 has 5 positions; the mesh has 6 vertices'),

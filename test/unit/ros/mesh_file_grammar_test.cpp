@@ -786,7 +786,37 @@ TEST_F(DaeGrammar, WhatAssimpWouldReadOtherwise) {
   }
   expectBad("<instance_geo", "<translate>0,5 0 0</translate><instance_geo", "<translate> has '0,5'");
   expectBad("<instance_geo", "<matrix>1 0 0 0</matrix><instance_geo", "<matrix> must have 16 numbers");
-  expectBad("<instance_geo", "<skew>45 1 0 0 0 1 0</skew><instance_geo", "<skew> is not read");
+  for (const std::string transform : {"skew>45 1 0 0 0 1 0</skew", "lookat>0 0 0 0 0 -1 1 1 1</lookat"}) {
+    expectBad("<instance_geo", "<" + transform + "><instance_geo", "> is not read; write the node with a <matrix>");
+  }
+  for (const std::string axis : {"0 0 2", "1 1 0", "0 0 0", "0 0 nan", "0.7071 0.7071 0"}) {
+    expectBad("<instance_geo", "<rotate>" + axis + " 90</rotate><instance_geo", "has an axis whose length is not 1");
+  }
+  for (const std::string row : {"0 0 0 2", "1 0 0 1"}) {
+    expectBad("<instance_geo", "<matrix>1 0 0 0 0 1 0 0 0 0 1 0 " + row + "</matrix><instance_geo", "end with 0 0 0 1");
+  }
+  expectBad("<instance_geometry url=\"#g\"/>", "<instance_controller url=\"#c\"/>",
+            "<instance_controller> is not read");
+  for (const std::string name : {"name=\"y\" ", "name=\"S\" ", "name=\"X\" ", ""}) {
+    expectBad("name=\"Y\" ", name, "must have one <param> each of the names X, Y and Z");
+  }
+  expectBad("<param name=\"Z\" type=\"float\"/>", "", "must have one <param> each");
+  expectBad("2 1 3", "2 1 <!-- three --> 3", "<p> has something beside its text");
+  expectBad("1 1 0.25", "1 <![CDATA[1]]> 0.25", "<float_array> has something beside its text");
+  expectBad("<geometry id=\"g\">", "<geometry id=\"g\"><asset><unit meter=\"0.001\"/></asset>",
+            "<unit> is another one than the file's");
+}
+
+TEST_F(DaeGrammar, AxesOfSixDigits) {
+  const std::string turn = "<rotate>0 0 0 0</rotate><rotate>0.57735 0.57735 0.57735 120</rotate>";
+  expectNear(readDae(dae(two(), node(turn))).positions, {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.25, 1, 1}});
+}
+
+/// assimp makes bodies of the nodes of a file that has no mesh.
+TEST_F(DaeGrammar, WithoutAMesh) {
+  const std::string nodes = "<node><translate>1 2 3</translate><node><translate>0 1 0</translate></node></node>";
+  expectRefused("a.dae", dae(two(), nodes), "a.dae: ", "there are no triangles");
+  expectRefused("a.dae", dae(list("triangles", 0, "<p></p>"), node() + nodes), "a.dae: ", "there are no triangles");
 }
 
 // --- the page

@@ -197,6 +197,40 @@ TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {
   }
 }
 
+// Nothing is passed over that may be a surface: what is left out of the model is missing.
+TEST_F(RobotModel, ShapesThatWouldNotBeReadAreMissing) {
+  const std::string box = "<geometry><box size='1 1 1'/></geometry>", far = "<origin xyz='9 9 9'/>";
+  const std::pair<std::string, const char*> cases[] = {
+      {link("bad", collision("<sphere radius='1'/><box size='1 1 1'/>")),
+       "link 'bad' is not watched: its collision element 1 (line 1) has more than one shape"},
+      {link("bad", "<collision>" + box + box + "</collision>"), "has more than one <geometry>"},
+      {link("bad", collision("<box size='1 1 1'/>", far + far)), "has more than one <origin>"},
+      {link("bad", "<Collision>" + box + "</Collision>"),
+       "not watched: a <geometry> in <Collision> of line 1, where no URDF has one"},
+      {link("bad", "<parts><collision>" + box + "</collision></parts>"), "not watched: a <geometry> in <collision>"},
+      {link("bad", "") + "<Link name='c'><collision>" + box + "</collision></Link>", "a <geometry> in <collision>"},
+      {link("bad", "") + "<group>" + link("c", collision("<box size='1 1 1'/>")) + "</group>",
+       "in <collision> of line"},
+  };
+  for (const auto& [bad, expected] : cases) {
+    const Robot robot = robotFrom(robotOf(bad + link("good", collision("<box size='1 1 1'/>")) + joint("good", "bad")));
+    ASSERT_EQ(robot.parts.size(), 1u) << bad;
+    ASSERT_EQ(robot.missing.size(), 1u) << bad;
+    EXPECT_TRUE(says(robot.missing, expected)) << robot.missing[0];
+  }
+  const std::string sensor = "<gazebo reference='good'><visual>" + box + "</visual></gazebo>";
+  EXPECT_EQ(joinedText(robotFrom(robotOf(link("good", collision("<box size='1 1 1'/>")) + sensor)).missing), "");
+}
+
+TEST_F(RobotModel, WhatWaitsForXacroIsNoRobot) {
+  for (const std::string waits :
+       {"<xacro:include filename='arm.xacro'/>", "<xacro:if value='1'><link name='b'/></xacro:if>"}) {
+    const Robot robot = robotFrom(robotOf(link("a", collision("<box size='1 1 1'/>") + waits)));
+    EXPECT_FALSE(robot.known);
+    EXPECT_TRUE(says(robot.missing, "of line 1, so that xacro has not expanded it yet")) << joinedText(robot.missing);
+  }
+}
+
 // What urdfdom passes over would be where it is not.
 TEST_F(RobotModel, AnOriginByQuaternionIsRefused) {
   const std::string box = "<box size='1 1 1'/>";
