@@ -46,12 +46,13 @@ bool isConfirmedBy(const Contact& recorded, const Contact& replayed) {
 /// are no more than the first ones.
 std::vector<std::string> compareCertain(const Options& options, const Outcome& recorded, const Outcome& replayed) {
   const bool first_alone = options.earliest_only || replayed.contacts.size() < replayed.total_contacts;
+  const double first = replayed.suppressed > 0 ? 0 : replayed.earliest_toc;
   std::vector<std::string> found;
   for (const Contact& c : recorded.contacts) {
     if (c.certainty != Certainty::CERTAIN) continue;
     const auto again = std::find_if(replayed.contacts.begin(), replayed.contacts.end(),
                                     [&](const Contact& other) { return isOfSamePair(c, other); });
-    const bool may_lack = !replayed.complete || (first_alone && replayed.earliest_toc <= c.toc_upper);
+    const bool may_lack = !replayed.complete || (first_alone && first <= c.toc_upper);
     if (again == replayed.contacts.end() ? may_lack : isConfirmedBy(c, *again)) continue;
     found.push_back("recorded as certain, not replayed: " + pairText(c));
   }

@@ -129,6 +129,10 @@ TEST(StepReplay, OfAStepThatRanOutOfItsBudgetTheFirstAreEnoughWhereNoOthersAreLi
   r.answer.contacts.back().toc_lower = r.answer.contacts.back().toc_upper = 0.125;
   EXPECT_TRUE(differ(true, r.answer.contacts.size())) << "before the first one";
   EXPECT_TRUE(differ(false, 1));
+  r = recordScene();
+  r.answer.complete = false;
+  r.options.suppress_initial = true;
+  EXPECT_FALSE(differ(true, r.answer.contacts.size())) << "the first one is left out";
 }
 
 TEST(StepReplay, OfAStepThatRanOutOfItsBudgetWhatIsCertainMayTakeLonger) {
