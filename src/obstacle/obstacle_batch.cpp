@@ -77,6 +77,7 @@ ObstacleBatch::ObstacleBatch(PairKind kind, const Rung* test) : kind_(kind), tes
 
 void ObstacleBatch::clear(const Deadline& deadline) {
   deadline_ = deadline;
+  late_ = false;
   dropPairs();
   releaseBurst(contacts_);
   contacts_.clear();
@@ -111,9 +112,13 @@ void ObstacleBatch::flush() {
   if (deadline_.canEnd()) batch.deadline = &deadline_;
   TierCounters uncounted;  // statistics tell of pairs of meshes alone
   test_->run(batch, results_.data(), uncounted);
+  bool undecided = false;
   for (std::size_t i = 0; i < count; ++i) {
-    if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);
+    if (results_[i].verdict == Verdict::NO_CONTACT) continue;
+    append(i, results_[i]);
+    undecided |= results_[i].verdict == Verdict::UNDECIDED;
   }
+  late_ = late_ || (undecided && deadline_.isOver());
   dropPairs();
 }
 

@@ -29,6 +29,8 @@ class ObstacleBatch {
   void add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m);
   /// Tests what is left. Contacts are found in the order of add().
   void flush();
+  /// The deadline left a pair undecided since clear().
+  bool isLate() const { return late_; }
 
   std::vector<Contact>& contacts() { return contacts_; }
   const std::vector<Contact>& contacts() const { return contacts_; }
@@ -41,6 +43,7 @@ class ObstacleBatch {
   PairKind kind_;
   const Rung* test_;
   Deadline deadline_;
+  bool late_ = false;
   bool any_separation_ = false;  // of the pairs that wait
   std::vector<ObstaclePair> pairs_;
   std::vector<double> toc_bounds_;

@@ -145,6 +145,7 @@ std::size_t ObstacleCheck::Impl::foundCount() const {
 void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found) {
   const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch) {
     batch.flush();
+    late = late || batch.isLate();
     // Settled ones are mostly in order already, and the tested ones few.
     std::vector<Contact>& tested = batch.contacts();
     sortAndJoin(tested);

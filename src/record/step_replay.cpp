@@ -32,29 +32,47 @@ bool isOfSamePair(const Contact& a, const Contact& b) {
          a.voxel_size == b.voxel_size;
 }
 
-/// The recorded step ended early: what it called certain must be among the replayed contacts, unless a limit cut these,
-/// too: which ones it leaves follows from where the bodies were when the clusters were made.
-std::vector<std::string> compareCertain(const Outcome& recorded, const Outcome& replayed) {
+/// Of a contact in several places of a leaf, or in several parts of the step, the budget may have left the first
+/// undecided: then it is certain within a longer time.
+bool isConfirmedBy(const Contact& recorded, const Contact& replayed) {
+  const bool longer = recorded.toc_lower < replayed.toc_lower || replayed.toc_upper < recorded.toc_upper;
+  if (!longer) return isSame(recorded, replayed);
+  return replayed.certainty == Certainty::CERTAIN && recorded.toc_lower <= replayed.toc_lower &&
+         replayed.toc_upper <= recorded.toc_upper;
+}
+
+/// The recorded step ended early: what it called certain must be among the replayed contacts. It need not where a limit
+/// cut these, too (which ones it leaves follows from where the bodies were when the clusters were made), or where they
+/// are no more than the first ones.
+std::vector<std::string> compareCertain(const Options& options, const Outcome& recorded, const Outcome& replayed) {
+  const bool first_alone = options.earliest_only || replayed.contacts.size() < replayed.total_contacts;
+  const double first = replayed.suppressed > 0 ? 0 : replayed.earliest_toc;
   std::vector<std::string> found;
   for (const Contact& c : recorded.contacts) {
     if (c.certainty != Certainty::CERTAIN) continue;
     const auto again = std::find_if(replayed.contacts.begin(), replayed.contacts.end(),
                                     [&](const Contact& other) { return isOfSamePair(c, other); });
-    if (again == replayed.contacts.end() ? !replayed.complete : isSame(c, *again)) continue;
+    const bool may_lack = !replayed.complete || (first_alone && first <= c.toc_upper);
+    if (again == replayed.contacts.end() ? may_lack : isConfirmedBy(c, *again)) continue;
     found.push_back("recorded as certain, not replayed: " + pairText(c));
   }
   return found;
 }
 
 /// An edge through a face comes before what lies inside; earliest_only lists the one that it comes to first, which
-/// depends on the clusters, too.
+/// depends on the clusters, too, and so do the patches of it.
 bool listsACrossing(const Outcome& answer) {
   return !answer.intersections.empty() && answer.intersections.front().vertex[4] != NO_INDEX;
 }
 
 std::vector<std::string> compareWhole(const Options& options, const Outcome& recorded, Outcome replayed) {
   if (options.earliest_only && listsACrossing(recorded) && listsACrossing(replayed)) {
-    replayed.intersections.front() = recorded.intersections.front();
+    StartIntersection &is = replayed.intersections.front(), was = recorded.intersections.front();
+    if (is.body != was.body || is.vertex != was.vertex) {
+      replayed.patches = recorded.patches;
+      replayed.patch_of = recorded.patch_of;
+    }
+    is = was;
   }
   replayed.reason = recorded.reason;      // words alone
   replayed.excluded = recorded.excluded;  // what was left out before the step was made, no recording knows
@@ -78,7 +96,7 @@ std::vector<std::string> compareWhole(const Options& options, const Outcome& rec
 std::vector<std::string> compareAnswers(const Options& options, const Outcome& recorded, const Outcome& replayed) {
   if (!recorded.answered) return {};
   std::vector<std::string> found =
-      recorded.complete ? compareWhole(options, recorded, replayed) : compareCertain(recorded, replayed);
+      recorded.complete ? compareWhole(options, recorded, replayed) : compareCertain(options, recorded, replayed);
   found.resize(std::min(found.size(), MAX_DIFFERENCES));
   return found;
 }

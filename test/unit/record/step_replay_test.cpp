@@ -108,6 +108,48 @@ TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
   EXPECT_FALSE(replayStep(r).differences.empty());
 }
 
+TEST(StepReplay, OfAStepThatRanOutOfItsBudgetTheFirstAreEnoughWhereNoOthersAreListed) {
+  StepRecording r;
+  TestStep falls = crossing();
+  for (Vec3& x : falls.bodies[1].t1) x.z() -= 2;
+  r.step = falls.motion();
+  History history;
+  r.answer = detect(r.step, r.options, history);
+  r.answer.complete = false;
+  r.has_answer = true;
+  ASSERT_GT(r.answer.contacts.size(), 1u);
+  const auto differ = [&r](bool earliest_only, std::size_t max_contacts) {
+    r.options.earliest_only = earliest_only;
+    r.options.max_contacts = max_contacts;
+    return !replayStep(r).differences.empty();
+  };
+  EXPECT_FALSE(differ(true, r.answer.contacts.size()));
+  EXPECT_FALSE(differ(false, 1));
+  ASSERT_EQ(r.answer.earliest_toc, 0.25);
+  r.answer.contacts.back().toc_lower = r.answer.contacts.back().toc_upper = 0.125;
+  EXPECT_TRUE(differ(true, r.answer.contacts.size())) << "before the first one";
+  EXPECT_TRUE(differ(false, 1));
+  r = recordScene();
+  r.answer.complete = false;
+  r.options.suppress_initial = true;
+  EXPECT_FALSE(differ(true, r.answer.contacts.size())) << "the first one is left out";
+}
+
+TEST(StepReplay, OfAStepThatRanOutOfItsBudgetWhatIsCertainMayTakeLonger) {
+  StepRecording r = recordScene();
+  r.answer.complete = false;
+  Contact& c = r.answer.contacts.front();
+  const Contact certain = c;
+  c.toc_lower = 0;
+  c.toc_upper = 1;
+  EXPECT_TRUE(replayStep(r).differences.empty());
+  c.toc_lower = certain.toc_upper;
+  EXPECT_EQ(replayStep(r).differences.size(), 1u);
+  c = certain;
+  c.leaving = !c.leaving;
+  EXPECT_EQ(replayStep(r).differences.size(), 1u);
+}
+
 /// The second of two steps, whose clusters were made of where the sheet was in the first.
 StepRecording recordAfterAnother(const Options& options) {
   StepRecording r;
@@ -138,7 +180,7 @@ TEST(StepReplay, WhatALimitLeavesDependsOnTheStepsBeforeAndIsNoDifference) {
 
 TEST(StepReplay, WhichCrossingIsListedAloneDependsOnTheStepsBeforeAndIsNoDifference) {
   Options options;
-  options.earliest_only = true;
+  options.earliest_only = options.patches = true;
   StepRecording r = recordAfterAnother(options);
   ASSERT_EQ(r.answer.intersections.size(), 1u);
   const StepReplay replay = replayStep(r);

@@ -1,6 +1,8 @@
 // A body that does not move keeps its contacts with a map that does not change, and only then.
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "support/step_support.h"
 
 namespace dccd {
@@ -102,6 +104,36 @@ TEST_F(OnAMap, ASeamAndOtherOptionsForget) {
   keeps.setOptions(forget);
   run(lying, lying, map);
   EXPECT_EQ(kept, 0u);
+}
+
+// What rests within its separation of the map is tested anew where nothing is kept, and the deadline may end that.
+TEST_F(OnAMap, WhatTheDeadlineLeftUndecidedIsNotKept) {
+  Body cloth;
+  cloth.name = "cloth";
+  cloth.topology = share(Topology::grid(3, 3));
+  cloth.minimum_separation_m = 0.1;
+  Positions near;
+  for (int i = 0; i < 9; ++i) near.emplace_back(0.5 * (i % 3) + 0.013, 0.5 * (i / 3) + 0.017, 1.05);
+  Step step = stepOf(cloth, near, near), before = step;
+  before.map.surface = surface(1);
+  step.map.surface = map;
+  Options options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  const Outcome whole = Detector(options).run(step);
+  ASSERT_EQ(whole.counts.undecided, 0u);
+  int cut = 0;
+  std::int64_t looks = 0;
+  for (bool ended = false; !ended; ++looks) {
+    History history;
+    detect(before, options, history);
+    std::atomic<std::int64_t> left{looks};
+    const Outcome late = detect(step, options, history, Deadline::afterLooks(left));
+    ended = late.complete;
+    cut += late.counts.undecided > 0;
+    EXPECT_TRUE(!late.complete || difference(late.contacts, whole.contacts).empty()) << looks;
+    EXPECT_EQ(difference(detect(step, options, history).contacts, whole.contacts), "") << "after " << looks << " looks";
+  }
+  EXPECT_GT(cut, 3);
 }
 
 }  // namespace
