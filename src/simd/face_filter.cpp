@@ -34,16 +34,41 @@ constexpr double FLOAT_ULPS = 0x1p29;  // so many times as large as a double's h
 
 /// a0, a1, a2, b1, b2 relative to b0.
 HWY_INLINE void gatherPair(const float* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT a,
-                           const uint32_t* HWY_RESTRICT b, size_t lane, float* HWY_RESTRICT block) {
+                           const uint32_t* HWY_RESTRICT b, size_t place, float* HWY_RESTRICT block) {
   const uint32_t corners[PAIR_POINTS] = {a[0], a[GROUP], a[2 * GROUP], b[GROUP], b[2 * GROUP]};
   const hn::CappedTag<float, 4> d;
   for (size_t k = 0; k < 4; k += hn::Lanes(d)) {
     const auto origin = hn::LoadU(d, positions + size_t{b[0]} * 4 + k);
     for (size_t i = 0; i < PAIR_POINTS; ++i) {
       const auto x = hn::LoadU(d, positions + size_t{corners[i]} * 4 + k);
-      hn::Store(hn::Sub(x, origin), d, block + i * PAIR_POINT_SIZE + lane * 4 + k);
+      hn::Store(hn::Sub(x, origin), d, block + i * PAIR_POINT_SIZE + place * 4 + k);
     }
   }
+}
+
+/// Where in a block a lane's four numbers stand, so that loadLanes() need not move them from one 128 bits to others.
+HWY_INLINE size_t placeOf(size_t lane) {
+  const size_t parts = HWY_MAX(hn::Lanes(DF()), 4) / 4;
+  return lane % 4 * parts + lane / 4;
+}
+
+/// As loadPoint(), of such a block.
+HWY_INLINE Float3 loadLanes(const float* HWY_RESTRICT block) {
+  const DF d;
+#if HWY_TARGET == HWY_SCALAR
+  return loadPoint(d, block);
+#else
+  const hn::RepartitionToWide<DF> two;  // a pair of lanes moves as one number
+  const size_t lanes = hn::Lanes(d);
+  const VF first = hn::Load(d, block), second = hn::Load(d, block + lanes);
+  const VF third = hn::Load(d, block + 2 * lanes), fourth = hn::Load(d, block + 3 * lanes);
+  const auto xy0 = hn::BitCast(two, hn::InterleaveLower(d, first, second));
+  const auto xy1 = hn::BitCast(two, hn::InterleaveLower(d, third, fourth));
+  const auto z0 = hn::BitCast(two, hn::InterleaveUpper(d, first, second));
+  const auto z1 = hn::BitCast(two, hn::InterleaveUpper(d, third, fourth));
+  return {hn::BitCast(d, hn::InterleaveLower(two, xy0, xy1)), hn::BitCast(d, hn::InterleaveUpper(two, xy0, xy1)),
+          hn::BitCast(d, hn::InterleaveLower(two, z0, z1))};
+#endif
 }
 
 /// The margin of a sum of products of as many factors as `powers` of M has, and M^2 (M + 2R) or M (M + 2R) it takes.
@@ -54,28 +79,56 @@ HWY_INLINE VF marginOf(double multiple, VF powers, VF size, float largest) {
                  hn::Set(d, tolerance::FUSED_UNDERFLOW));
 }
 
-/// Of which sign numbers certainly are.
+/// Only their sign bits are looked at: set where something is so.
+using DU = hn::RebindToUnsigned<DF>;
+using Flags = hn::Vec<DU>;
+
+/// Of which sign numbers certainly are. A rounded sum or difference has the sign of the true one, and no sign bit where
+/// that is 0, so that these are the comparisons value > margin and value < -margin.
 struct Signs {
-  hn::Mask<DF> plus, minus;
-  HWY_INLINE Signs(VF value, VF margin) : plus(hn::Gt(value, margin)), minus(hn::Lt(value, hn::Neg(margin))) {}
+  Flags plus, minus;
+  HWY_INLINE Signs(VF value, VF margin)
+      : plus(hn::BitCast(DU(), hn::Sub(margin, value))), minus(hn::BitCast(DU(), hn::Add(margin, value))) {}
 };
-HWY_INLINE hn::Mask<DF> areSame(const Signs& a, const Signs& b) {
-  return hn::Or(hn::And(a.plus, b.plus), hn::And(a.minus, b.minus));
+HWY_INLINE Flags areSame(const Signs& a, const Signs& b) {
+  return hn::OrAnd(hn::And(a.plus, b.plus), a.minus, b.minus);
 }
-HWY_INLINE hn::Mask<DF> differ(const Signs& a, const Signs& b, const Signs& c) {
-  return hn::And(hn::Or(hn::Or(a.plus, b.plus), c.plus), hn::Or(hn::Or(a.minus, b.minus), c.minus));
+HWY_INLINE Flags areSame(const Signs (&x)[3]) {
+  return hn::OrAnd(hn::And(hn::And(x[0].plus, x[1].plus), x[2].plus), hn::And(x[0].minus, x[1].minus), x[2].minus);
+}
+/// Or so already.
+HWY_INLINE Flags orDiffer(Flags so, const Signs& a, const Signs& b, const Signs& c) {
+  return hn::OrAnd(so, hn::Or3(a.plus, b.plus, c.plus), hn::Or3(a.minus, b.minus, c.minus));
+}
+/// And so already.
+HWY_INLINE Flags andCertain(Flags so, const Signs (&x)[3]) {
+  for (const Signs& one : x) so = hn::And(so, hn::Or(one.plus, one.minus));
+  return so;
+}
+/// In all bits what the sign bit is.
+HWY_INLINE Flags spread(Flags flags) {
+  return hn::BitCast(DU(), hn::BroadcastSignBit(hn::BitCast(hn::RebindToSigned<DF>(), flags)));
+}
+
+/// Sets the bits of edge K of A and of edge K of B that miss the other face.
+template <int K>
+HWY_INLINE void addMisses(const Signs (&above)[3], const Signs (&over)[3], const Signs (&along)[3][3], Flags& misses) {
+  constexpr int NEXT = K == 2 ? 0 : K + 1, OF_B = K + static_cast<int>(SECOND_EDGES_SHIFT);
+  const Flags of_a = orDiffer(areSame(above[K], above[NEXT]), along[K][0], along[K][1], along[K][2]);
+  const Flags of_b = orDiffer(areSame(over[K], over[NEXT]), along[0][K], along[1][K], along[2][K]);
+  misses = hn::OrAnd(misses, hn::ShiftRight<31 - K>(of_a), hn::Set(DU(), 1u << K));
+  misses = hn::OrAnd(misses, hn::ShiftRight<31 - OF_B>(of_b), hn::Set(DU(), 1u << OF_B));
 }
 
 /// Bits of the edges, of those that are asked about.
-HWY_INLINE hn::Vec<hn::RebindToUnsigned<DF>> pairBlock(const float* HWY_RESTRICT block, float largest_coordinate,
-                                                       const uint32_t* HWY_RESTRICT asked) {
+HWY_INLINE Flags pairBlock(const float* HWY_RESTRICT block, float largest_coordinate,
+                           const uint32_t* HWY_RESTRICT asked) {
   const DF d;
-  const hn::RebindToUnsigned<DF> du;
   Float3 a[3], b[2];
   VF size = hn::Zero(d);
   for (size_t i = 0; i < PAIR_POINTS; ++i) {
     Float3& point = i < 3 ? a[i] : b[i - 3];
-    point = loadPoint(d, block + i * PAIR_POINT_SIZE);
+    point = loadLanes(block + i * PAIR_POINT_SIZE);
     size = hn::Max(size, largest(point));
   }
   const VF squared = hn::Mul(size, size);
@@ -96,37 +149,27 @@ HWY_INLINE hn::Vec<hn::RebindToUnsigned<DF>> pairBlock(const float* HWY_RESTRICT
   const auto passes = [&](size_t i) HWY_ATTR {
     return hn::Sub(hn::Sub(hn::Sub(height[i == 2 ? 0 : i + 1], height[i]), from[i]), to[i]);
   };
-  const VF between[3] = {passes(0), passes(1), passes(2)};
-  const Signs along[3][3] = {{{from[0], short_margin}, {between[0], long_margin}, {to[0], short_margin}},
-                             {{from[1], short_margin}, {between[1], long_margin}, {to[1], short_margin}},
-                             {{from[2], short_margin}, {between[2], long_margin}, {to[2], short_margin}}};
+  const Signs along[3][3] = {{{from[0], short_margin}, {passes(0), long_margin}, {to[0], short_margin}},
+                             {{from[1], short_margin}, {passes(1), long_margin}, {to[1], short_margin}},
+                             {{from[2], short_margin}, {passes(2), long_margin}, {to[2], short_margin}}};
   const auto sum = [](const VF* x) HWY_ATTR { return hn::Add(hn::Add(x[0], x[1]), x[2]); };
-  const VF depth[3] = {hn::Neg(volume), hn::Sub(sum(from), volume), hn::Sub(hn::Neg(sum(to)), volume)};
-  const Signs over[3] = {{depth[0], long_margin}, {depth[1], long_margin}, {depth[2], long_margin}};
+  const Signs over[3] = {{hn::Neg(volume), long_margin},
+                         {hn::Sub(sum(from), volume), long_margin},
+                         {hn::Sub(hn::Neg(sum(to)), volume), long_margin}};
 
-  auto bits = hn::Zero(du), all = hn::Zero(du);
-  const auto keep = [&](hn::Mask<DF> misses, size_t edge) HWY_ATTR {
-    const auto bit = hn::Set(du, 1u << edge);
-    bits = hn::Or(bits, hn::IfThenZeroElse(hn::RebindMask(du, misses), bit));
-    all = hn::Or(all, bit);
-  };
-  for (size_t k = 0; k < 3; ++k) {
-    const size_t next = k == 2 ? 0 : k + 1;
-    keep(hn::Or(areSame(above[k], above[next]), differ(along[k][0], along[k][1], along[k][2])), k);
-    keep(hn::Or(areSame(over[k], over[next]), differ(along[0][k], along[1][k], along[2][k])), k + SECOND_EDGES_SHIFT);
-  }
   // Where all of a face is on one side of the other's plane, no edge meets anything.
-  const auto apart = hn::Or(hn::And(areSame(above[0], above[1]), areSame(above[1], above[2])),
-                            hn::And(areSame(over[0], over[1]), areSame(over[1], over[2])));
-  bits = hn::IfThenZeroElse(hn::RebindMask(du, apart), bits);
-  const auto guarded = hn::Le(size, hn::Set(d, tolerance::FUSED_LARGEST_M));
-  bits = hn::And(hn::IfThenElse(hn::RebindMask(du, guarded), bits, all), hn::Load(du, asked));
-  const auto nearest = [](const VF* x)
-                           HWY_ATTR { return hn::Min(hn::Min(hn::Abs(x[0]), hn::Abs(x[1])), hn::Abs(x[2])); };
-  const auto strict =
-      hn::And(guarded, hn::And(hn::Gt(hn::Min(hn::Min(nearest(height), nearest(from)), nearest(to)), short_margin),
-                               hn::Gt(hn::Min(nearest(between), nearest(depth)), long_margin)));
-  return hn::Or(bits, hn::IfThenElseZero(hn::RebindMask(du, strict), hn::ShiftLeft<MEETS_SHIFT>(bits)));
+  Flags misses = spread(hn::Or(areSame(above), areSame(over)));
+  addMisses<0>(above, over, along, misses);
+  addMisses<1>(above, over, along, misses);
+  addMisses<2>(above, over, along, misses);
+  Flags strict = andCertain(andCertain(hn::Not(hn::Zero(DU())), above), over);
+  for (const auto& edge : along) strict = andCertain(strict, edge);
+  // Beyond that numbers may be infinite, or none.
+  const VF most = hn::Set(d, std::isinf(largest_coordinate) ? -1.0f : tolerance::FUSED_LARGEST_M);
+  const auto guarded = hn::RebindMask(DU(), hn::Le(size, most));
+  const Flags bits = hn::AndNot(hn::IfThenElseZero(guarded, misses), hn::Load(DU(), asked));
+  const Flags meets = hn::IfThenElseZero(guarded, spread(strict));
+  return hn::OrAnd(bits, meets, hn::ShiftLeft<MEETS_SHIFT>(bits));
 }
 
 FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
@@ -142,7 +185,7 @@ FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const
     const size_t n = first >= count ? 0 : HWY_MIN(lanes, count - first);
     for (size_t lane = 0; lane < n; ++lane) {
       const size_t f = slots[2 * (first + lane)], g = slots[2 * (first + lane) + 1];
-      gatherPair(vertices.positions, corners(a, f), corners(b, g), lane, blocks[block]);
+      gatherPair(vertices.positions, corners(a, f), corners(b, g), placeOf(lane), blocks[block]);
       asked[block][lane] = uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
       result.asked += hwy::PopCount(asked[block][lane]);
     }

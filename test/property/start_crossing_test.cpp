@@ -4,7 +4,9 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <map>
 
+#include "simd/face_filter.h"
 #include "simd/segment_filter.h"
 #include "step/start/segment_triangle.h"
 #include "step/start/start_state.h"
@@ -106,6 +108,85 @@ TEST(StartCrossing, PairsOfEverySizeAreAsTheOracleSays) {
   EXPECT_GT(meeting, all / 4);
   EXPECT_LT(meeting, all * 3 / 4);
   EXPECT_GT(undecided, all / 10) << "exact arithmetic has hardly been asked";
+}
+
+/// Pairs of faces in one array: face i is lane i % 16 of group i / 16, and meets the next one.
+struct FaceBatch {
+  std::vector<VertexMotion> vertices;
+  std::vector<std::uint32_t> corners, slots;
+  std::vector<std::uint8_t> edges;
+
+  void add(const std::array<Vec3, 6>& x) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      const std::size_t slot = edges.size(), lane = slot % simd::GROUP;
+      corners.resize((slot / simd::GROUP + 1) * 3 * simd::GROUP);
+      corners[slot / simd::GROUP * 3 * simd::GROUP + i % 3 * simd::GROUP + lane] =
+          static_cast<std::uint32_t>(vertices.size());
+      if (i % 3 == 2) {
+        slots.push_back(static_cast<std::uint32_t>(slot));
+        edges.push_back(7);
+      }
+      VertexMotion v{};
+      std::copy_n(x[i].data(), 3, v.t0);
+      vertices.push_back(v);
+    }
+  }
+  Vec3 at(std::size_t i) const { return Eigen::Map<const Vec3>(vertices[i].t0); }
+  /// Of each pair, all bits.
+  std::vector<std::uint32_t> bits() const {
+    double middle[4] = {}, largest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] =
+          std::minmax_element(vertices.begin(), vertices.end(),
+                              [k](const VertexMotion& v, const VertexMotion& w) { return v.t0[k] < w.t0[k]; });
+      middle[k] = low->t0[k] / 2 + high->t0[k] / 2;
+      largest = std::max({largest, high->t0[k] - middle[k], middle[k] - low->t0[k]});
+    }
+    std::vector<float> near(4 * vertices.size());
+    simd::moveNear(vertices[0].t0, vertices.size(), middle, near.data());
+    std::vector<std::uint32_t> left(slots.size() / 2 + simd::PAIRS_BEHIND), all(slots.size() / 2, 0);
+    const simd::FacesView view{corners.data(), edges.data()};
+    left.resize(simd::facePairFilter({near.data(), simd::largestNear(largest)}, view, view, slots.data(), all.size(),
+                                     left.data())
+                    .left);
+    for (const std::uint32_t pair : left) all[pair >> simd::PLACE_SHIFT] = pair & ((1u << simd::PLACE_SHIFT) - 1);
+    return all;
+  }
+};
+
+TEST(StartCrossing, EdgesOfPairsOfFacesAreAsTheOracleSays) {
+  const int blocks = longRun() ? 1000 : 3, size = 1000;
+  std::size_t apart = 0, meeting = 0;
+  for (int block = 0; block < blocks; ++block) {
+    const Draw draw = drawFrom(63000 + static_cast<std::uint64_t>(block));
+    std::map<int, FaceBatch> by_size;  // a batch is rounded from its middle, as bodies are
+    for (int i = 0; i < size; ++i) {
+      const std::array<Vec3, 5> x = closePair(draw);
+      double largest = 0;
+      for (const Vec3& point : x) largest = std::max(largest, point.cwiseAbs().maxCoeff());
+      const Vec3 along = draw(0, 3) == 0 ? Vec3(x[1] - x[0]) : Vec3(x[4][2], x[3][0], x[2][1]);
+      const Vec3 third = x[0] + along / 4 + draw(-3, 3) / 4.0 * (x[3] - x[2]);
+      by_size[largest == 0 ? 0 : std::ilogb(largest) / 4].add({x[0], x[1], third, x[2], x[3], x[4]});
+    }
+    for (const auto& [which, batch] : by_size) {
+      const std::vector<std::uint32_t> bits = batch.bits();
+      for (std::size_t i = 0; i < bits.size(); ++i) {
+        for (std::size_t edge = 0; edge < 6; ++edge) {
+          const std::size_t a = 6 * i + (edge < 3 ? 0 : 3), b = 6 * i + (edge < 3 ? 3 : 0);
+          const bool meet = trulyMeet(batch.at(a + edge % 3), batch.at(a + (edge + 1) % 3), batch.at(b),
+                                      batch.at(b + 1), batch.at(b + 2));
+          const bool may = bits[i] >> edge & 1, does = bits[i] >> (edge + simd::MEETS_SHIFT) & 1;
+          ASSERT_TRUE(may || !meet) << "block " << block << ", size " << which << ", pair " << i << ", edge " << edge;
+          ASSERT_TRUE(meet || !does) << "block " << block << ", size " << which << ", pair " << i << ", edge " << edge;
+          apart += !may, meeting += does;
+        }
+      }
+      forEachSimdTarget(
+          [&](const std::string& target) { ASSERT_EQ(batch.bits(), bits) << target << ", size " << which; });
+    }
+  }
+  EXPECT_GT(apart, 6u * size * static_cast<std::size_t>(blocks) / 4);
+  EXPECT_GT(meeting, static_cast<std::size_t>(size) * static_cast<std::size_t>(blocks) / 8);
 }
 
 // In a plane across an axis doubles tell nearly all, also what meets: two sheets at rest in it are no hard case.

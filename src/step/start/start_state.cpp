@@ -32,6 +32,22 @@ std::size_t edgeCount(const SceneArrays& scene) {
   return n;
 }
 
+/// Of ranks that ascend from body to body, those of one body.
+template <class Feature>
+struct FeaturesOfBody {
+  std::uint16_t body = 0;
+  std::size_t begin = 0, count = 0;
+  const Feature* features = nullptr;
+  FeaturesOfBody() = default;
+  FeaturesOfBody(std::uint16_t of_body, std::size_t first, const std::vector<Feature>& all)
+      : body(of_body), begin(first), count(all.size()), features(all.data()) {}
+  bool hold(std::size_t rank) const { return rank - begin < count; }
+  const Feature& operator[](std::size_t rank) const { return features[rank - begin]; }
+  void fetch(std::size_t rank) const {
+    if (hold(rank)) __builtin_prefetch(&features[rank - begin]);
+  }
+};
+
 /// List i goes to place[i] and on, up to place[i + 1].
 void join(const std::vector<std::vector<EdgeFace>>& lists, const std::vector<std::size_t>& place,
           std::vector<EdgeFace>& out, const StartStateSearch::Parallel& parallel) {
@@ -109,30 +125,31 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
   keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());  // a candidate that the search came to as well
   out.resize(keys_.size());
   parallel(keys_.size(), LISTED_PIECE, [&](std::size_t first, std::size_t last) {
-    const auto bodyOf = [&](Index SceneBody::*begin, Index rank, std::size_t before) {
-      const bool same =
-          bodies[before].*begin <= rank && (before + 1 == bodies.size() || rank < bodies[before + 1].*begin);
-      if (same) return static_cast<std::uint16_t>(before);
+    const auto bodyOf = [&](Index SceneBody::*begin, std::size_t rank) {
       const auto next = std::upper_bound(bodies.begin(), bodies.end(), rank,
-                                         [begin](Index r, const SceneBody& body) { return r < body.*begin; });
+                                         [begin](std::size_t r, const SceneBody& body) { return r < body.*begin; });
       return static_cast<std::uint16_t>(next - bodies.begin() - 1);
     };
-    std::array<std::uint16_t, 2> body{0, 0};
-    const std::uint64_t faces = (std::uint64_t{1} << shift) - 1;
+    FeaturesOfBody<Edge> edges;
+    FeaturesOfBody<Face> faces;
+    const std::uint64_t face_bits = (std::uint64_t{1} << shift) - 1;
     for (std::size_t i = first; i < last; ++i) {
-      const auto edge = static_cast<Index>(keys_[i] >> shift), face = static_cast<Index>(keys_[i] & faces);
+      const std::size_t edge = keys_[i] >> shift, face = keys_[i] & face_bits;
+      if (!edges.hold(edge)) {
+        const std::uint16_t body = bodyOf(&SceneBody::edge_begin, edge);
+        edges = {body, bodies[body].edge_begin, bodies[body].setup.topology->edges()};
+      }
+      if (!faces.hold(face)) {
+        const std::uint16_t body = bodyOf(&SceneBody::face_begin, face);
+        faces = {body, bodies[body].face_begin, neighbourhoods_[body].listed};
+      }
       const std::uint64_t soon = keys_[std::min(i + LISTED_AHEAD, last - 1)];
-      const std::vector<Edge>& edges = bodies[body[0]].setup.topology->edges();
-      const std::size_t edge_soon = (soon >> shift) - bodies[body[0]].edge_begin;
-      if (edge_soon < edges.size()) __builtin_prefetch(&edges[edge_soon]);
-      const std::size_t listed_soon = (soon & faces) - bodies[body[1]].face_begin;
-      const std::vector<Face>& listed = neighbourhoods_[body[1]].listed;
-      if (listed_soon < listed.size()) __builtin_prefetch(&listed[listed_soon]);
-      body = {bodyOf(&SceneBody::edge_begin, edge, body[0]), bodyOf(&SceneBody::face_begin, face, body[1])};
-      out[i].body = body;
-      scene.featureVertices(FeatureKind::EDGE, body[0], edge, out[i].vertex.data());
-      const Face& of_face = neighbourhoods_[body[1]].listed[face - bodies[body[1]].face_begin];
-      std::copy(of_face.begin(), of_face.end(), out[i].vertex.begin() + 2);
+      edges.fetch(soon >> shift);
+      faces.fetch(soon & face_bits);
+      const Edge& e = edges[edge];
+      const Face& f = faces[face];
+      out[i].body = {edges.body, faces.body};
+      out[i].vertex = {e[0], e[1], f[0], f[1], f[2]};
     }
   });
 }
@@ -262,7 +279,8 @@ void StartStateSearch::setUnits(std::size_t fans) {
   for (std::size_t p = 0; p < groups_.size(); p += 2) {
     if (fans_ + groups_[p] >= next_unit_) by_group_.push_back({groups_[p], groups_[p + 1]});
   }
-  std::sort(by_group_.begin(), by_group_.end());
+  const auto key = [](const std::array<std::uint32_t, 2>& pair) { return std::uint64_t{pair[0]} << 32 | pair[1]; };
+  std::sort(by_group_.begin(), by_group_.end(), [&](const auto& x, const auto& y) { return key(x) < key(y); });
   unit_number_.clear();
   unit_begin_.clear();
   for (std::uint32_t fan = next_unit_; fan < fans_; ++fan) {
@@ -361,6 +379,8 @@ void StartStateSearch::remember(const SceneArrays& scene, const std::vector<Cont
   const std::size_t limit = std::max(
       FEW_CANDIDATES,
       edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_100_EDGES_WITH_DEADLINE : CANDIDATES_PER_100_EDGES) / 100);
+  const std::size_t most = limit / CANDIDATES_PER_CONTACT;  // those with the map come last
+  if (contacts.size() > most && !factsOf(contacts[most].kind).isOnMap()) return;
   for (const Contact& contact : contacts) {
     if (factsOf(contact.kind).isOnMap()) continue;
     touched_.push_back({contact.kind, contact.body[0], contact.body[1], contact.vertex});
