@@ -131,7 +131,7 @@ target_precompile_headers(deformable_ccd_live_support PRIVATE <gtest/gtest.h> <r
 set_source_files_properties(test/unit/ros/include_order_core_first_test.cpp test/unit/ros/include_order_messages_first_test.cpp
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES}
-  LIBRARIES deformable_ccd_ros ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
+  LIBRARIES deformable_ccd_live_support deformable_ccd_ros ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
 # scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.
 find_package(fcl QUIET)
