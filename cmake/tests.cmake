@@ -116,11 +116,7 @@ if(DEFORMABLE_CCD_CORE_ONLY)
   return()
 endif()
 add_gtest_suite(octomap_tests SOURCES ${octomap_SOURCES} LIBRARIES deformable_ccd_octomap)
-# One test holds our readers of mesh files beside those of assimp and PCL.
-find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
-set_source_files_properties(test/unit/ros/mesh_file_differential_test.cpp PROPERTIES
-  INCLUDE_DIRECTORIES "${PCL_INCLUDE_DIRS}")
-# Another one holds a robot's links beside KDL.
+# One test holds a robot's links beside KDL.
 find_library(KDL_PARSER_LIBRARY kdl_parser REQUIRED)
 find_library(KDL_LIBRARY orocos-kdl REQUIRED)
 file(GLOB LIVE_SUPPORT_SOURCES CONFIGURE_DEPENDS test/ros/support/*.cpp)
@@ -135,7 +131,7 @@ target_precompile_headers(deformable_ccd_live_support PRIVATE <gtest/gtest.h> <r
 set_source_files_properties(test/unit/ros/include_order_core_first_test.cpp test/unit/ros/include_order_messages_first_test.cpp
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES}
-  LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY} ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
+  LIBRARIES deformable_ccd_live_support deformable_ccd_ros ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
 # scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.
 find_package(fcl QUIET)

@@ -3,9 +3,6 @@
 // hundred times more.
 #include <gtest/gtest.h>
 
-#include <iostream>
-#include <memory>
-
 #include "elementary/exact_tiers.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"

@@ -6,7 +6,6 @@
 
 #include <functional>
 #include <random>
-#include <set>
 
 #include "obstacle/voxel_surface_impl.h"
 

@@ -10,7 +10,6 @@
 #include <atomic>
 #include <cstdlib>
 #include <iostream>
-#include <memory>
 #include <mutex>
 #include <sstream>
 #include <utility>

@@ -1,22 +1,17 @@
 // A monitor that makes its map of a camera's clouds, at 5 Hz beside a cloth at 30 Hz: the camera is killed and comes
 // back, its tf stops, it sends what is no cloud. What is missing stands in ~state, and is there again afterwards.
-#include <deformable_ccd/State.h>
-
 #include <atomic>
 
 #include "ros/support/live_tests.h"
 #include "ros/support/missing.h"
-#include "ros/support/monitor_fixture.h"
 #include "ros/support/rate.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
-struct Seeing : MonitorTest {
-  Probe<deformable_ccd::State> state{node, "/seeing/state"};
-
-  Seeing() : MonitorTest("/seeing") {}
+struct Seeing : StateTest {
+  Seeing() : StateTest("/seeing") {}
 
   /// The camera is 1 m below the world's origin and looks up, at the lower side of a plate; with the sheet beside it,
   /// of which it sees that it lies at z = 0.
@@ -27,10 +22,6 @@ struct Seeing : MonitorTest {
       points.emplace_back(0.05 + 0.015 * (i % 20), 0.05 + 0.015 * (i / 20), 2.0);
     return cloud(points, ros::Time::now().toSec(), "camera");
   }
-  bool becomesProved() {
-    return waitUntil([&] { return state.count() > 0 && state.last().proved && state.last().clear; }, 15);
-  }
-  bool misses(const std::string& words) { return becomesMissing(state, clear, words); }
 };
 
 TEST_F(Seeing, SaysWhatOfTheCameraIsMissing) {

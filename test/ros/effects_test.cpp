@@ -1,4 +1,4 @@
-// Effects through the live node: separations of bodies and of pairs, distances, ropes, and rigid bodies that turn.
+// Effects through the live node: separations of bodies and of pairs, and distances.
 #include <deformable_ccd/ClearanceArray.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
@@ -16,8 +16,6 @@
 namespace dccd {
 namespace test {
 namespace {
-
-constexpr std::size_t MONITORS = 3;  // in effects.test; each listens to /tf
 
 // --- separations -----------------------------------------------------------------------------------------------------
 
@@ -118,66 +116,14 @@ TEST_F(Apart, DistancesAreMeasuredWhileSomebodyListens) {
     EXPECT_LE(said.clearance_lower, 0.5);
     EXPECT_GE(said.clearance_upper, 0.5);
     ASSERT_TRUE(waitUntil([&] { return distances.last().header.stamp == ros::Time(100); }));
-    EXPECT_EQ(distances.last().header.frame_id, "world");
-    EXPECT_EQ(distances.last().start, ros::Time(99.75));
     const deformable_ccd::Clearance pair = withMap(distances.last());
     EXPECT_EQ(pair.bodies[0], "mesh");
-    EXPECT_EQ(pair.at_end.status, deformable_ccd::ClearanceDistance::MEASURED);
-    EXPECT_LE(pair.at_end.lower, 0.5);
-    EXPECT_GE(pair.at_end.upper, 0.5);
-    EXPECT_LE(pair.at_end.upper - pair.at_end.lower, 1e-4);
-    EXPECT_NEAR(pair.at_end.points[0].z, 0.5, 1e-4);
-    EXPECT_NEAR(pair.at_end.points[1].z, 0, 1e-4) << "the top of the block";
-    EXPECT_NEAR(pair.direction.z, 1, 1e-6);
+    EXPECT_EQ(pair.at_end.lower, said.clearance_lower);
     EXPECT_NEAR(pair.closing_speed, 1, 1e-6) << "0.25 m in 0.25 s";
-    EXPECT_GE(pair.speed_bound, 1);
     ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100); }));
     EXPECT_GE(stats.last().clearance_in, 1u);
-
-    const deformable_ccd::State touched = fall(0.25, -0.0625, 150);
-    EXPECT_EQ(touched.touching, deformable_ccd::State::NEW);
-    EXPECT_EQ(touched.clearance_lower, 0);
-    EXPECT_EQ(touched.clearance_upper, 0);
-    ASSERT_TRUE(waitUntil([&] { return distances.last().header.stamp == ros::Time(150); }));
-    EXPECT_EQ(withMap(distances.last()).over_step.status, deformable_ccd::ClearanceDistance::TOUCHING);
   }
   EXPECT_TRUE(waitUntil([&] { return !running(); })) << "the subscriber has gone";
-}
-
-// --- a rope, and a finger that turns ---------------------------------------------------------------------------------
-
-struct Turning : MonitorTest {
-  Turning() : MonitorTest("/turning") {}
-  ros::Publisher rope = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/turning/rope");
-  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
-
-  /// The finger, a box of 0.5 x 0.5 x 0.8 m, turns about its vertical axis; the rope hangs straight down at (x, y).
-  deformable_ccd::ContactArray turn(double angle, double x, double y, double start_s) {
-    const Positions points{{x, y, -1}, {x, y, -0.5}, {x, y, 0}, {x, y, 0.5}, {x, y, 1}};
-    tf2_msgs::TFMessage from = transformAt(start_s, "turning_finger", {0, 0, 0}), to = from;
-    to.transforms[0].header.stamp += ros::Duration(0.1);
-    to.transforms[0].transform.rotation.z = std::sin(angle / 2);
-    to.transforms[0].transform.rotation.w = std::cos(angle / 2);
-    tf.publish(from);
-    tf.publish(to);
-    send(rope, cloud(points, start_s));
-    const deformable_ccd::ContactArray outcome = send(rope, cloud(points, start_s + 0.1));
-    EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == to.transforms[0].header.stamp; }));
-    return outcome;
-  }
-};
-
-TEST_F(Turning, ALargeTurnSplitsTheStepAndTheStatisticsSaySo) {
-  turn(1.5, 5, 5, 10);
-  EXPECT_EQ(stats.last().substeps, 1u) << "far from all that it is tested against";
-  const deformable_ccd::ContactArray outcome = turn(1.5, 0, 0.4, 20);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  EXPECT_TRUE(outcome.contacts.empty());
-  // Corners 0.534 m from the frame's origin: arcs of 0.123 rad stay within 1 mm of their chords.
-  EXPECT_EQ(stats.last().substeps, 13u);
-  EXPECT_GT(stats.last().rigid_bodies_ms, 0);
-  turn(0.05, 0, 0.4, 30);
-  EXPECT_EQ(stats.last().substeps, 1u);
 }
 
 }  // namespace

@@ -72,17 +72,6 @@ TEST_F(Pressing, NoEffectIsOnThatNobodyListensTo) {
   EXPECT_TRUE(waitUntil([&] { return !lookAhead().running; })) << "the subscriber has gone";
 }
 
-TEST_F(Pressing, InAnotherPhaseAContactIsAnAlarm) {
-  EXPECT_TRUE(setPhase("").success);
-  const ContactArray outcome = move(0.1, -0.01, 100);
-  ASSERT_EQ(outcome.contacts.size(), 1u) << outcome.reason;
-  EXPECT_FALSE(outcome.contacts[0].expected);
-  EXPECT_EQ(outcome.expected_contacts, 0u);
-  EXPECT_EQ(said.touching, State::NEW);
-  EXPECT_TRUE(said.expected.empty());
-  EXPECT_TRUE(first.last().contact);
-}
-
 TEST_F(Pressing, InItsPhaseItIsFoundListedCountedMarkedAndNoAlarm) {
   const auto reply = setPhase("press");
   EXPECT_TRUE(reply.success);

@@ -1,8 +1,6 @@
 // A monitor beside an emulated octomap_server, a process of its own that integrates a camera's clouds at 5 Hz: it comes
 // late, is killed, comes back without what it knew, is slow, and loses the camera's tf. What is missing stands in
 // ~state, and is there again afterwards; what the map shows of the sheet is the sheet's own throughout.
-#include <deformable_ccd/State.h>
-
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
@@ -16,7 +14,6 @@
 #include "dccd/cloud_map.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/missing.h"
-#include "ros/support/monitor_fixture.h"
 #include "ros/support/rate.h"
 
 namespace dccd {
@@ -84,9 +81,8 @@ class Server {
   pid_t process_ = -1;
 };
 
-struct Served : MonitorTest {
-  Probe<deformable_ccd::State> state{node, "/served/state"};
-  Served() : MonitorTest("/served") {}
+struct Served : StateTest {
+  Served() : StateTest("/served") {}
 
   /// The camera is 1 m below the world's origin and looks up: at the sheet in z = 0.05, which sinks and rises by 3 cm
   /// with the seconds, and beside it at a plate in z = 0.85.
@@ -100,9 +96,6 @@ struct Served : MonitorTest {
     }
     return cloud(points, now_s, "camera");
   }
-  bool becomesProved() {
-    return waitUntil([&] { return state.count() > 0 && state.last().proved && state.last().clear; }, 15);
-  }
   bool ownsTheSheet() {
     return waitUntil(
         [&] {
@@ -112,7 +105,6 @@ struct Served : MonitorTest {
         },
         15);
   }
-  bool misses(const std::string& words) { return becomesMissing(state, clear, words); }
 };
 
 TEST_F(Served, SaysWhatOfTheServersMapIsMissing) {

@@ -203,15 +203,8 @@ struct FabricSimulator : Preset {
   /// 16 x 23 = 368 vertices: spheres for the vertices, lines for the edges, and a soup of triangles, all in one array,
   /// without namespaces, in the frame map.
   static visualization_msgs::MarkerArray markers(double z) {
-    Mesh mesh{grid(16, 23, 1.0 / 15, z), {}};
-    for (Index r = 0; r + 1 < 16; ++r) {
-      for (Index c = 0; c + 1 < 23; ++c) {
-        const Index a = r * 23 + c;
-        mesh.faces.push_back({a, a + 1, a + 23});
-        mesh.faces.push_back({a + 1, a + 24, a + 23});
-      }
-    }
-    visualization_msgs::MarkerArray triangles = soup(mesh, 0), out;
+    visualization_msgs::MarkerArray triangles = soup({grid(16, 23, 1.0 / 15, z), Topology::grid(16, 23).faces()}, 0),
+                                    out;
     triangles.markers[0].header.frame_id = "map";
     triangles.markers[0].header.stamp = ros::Time::now();
     visualization_msgs::Marker points = triangles.markers[0], lines = triangles.markers[0];
@@ -234,6 +227,11 @@ TEST_F(FabricSimulator, TriangleSoupAmongOtherMarkers) {
   expectTouched();
 }
 
+/// Vertices 0.05 m apart, of now.
+deformable_ccd::MeshStamped clothOf(std::size_t rows, std::size_t cols, double z) {
+  return meshStamped({grid(rows, cols, 0.05, z), Topology::grid(rows, cols).faces()}, ros::Time::now().toSec(), "map");
+}
+
 struct OctomapServer : Preset {
   OctomapServer() : Preset("octomap_server") {}
 };
@@ -243,36 +241,10 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
   // The sensor saw the left half of the cloth at rest, at z = 0.31.
   map.publish(tableMap([](const Vec3& c) { return std::abs(c.z() - 0.325) < 0.03 && c.x() > -0.2 && c.x() < 0; }));
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/octomap_server/mesh");
-  const auto frame = [&](double z) {
-    const Positions positions = grid(5, 9, 0.05, z);
-    Mesh mesh{positions, {}};
-    for (Index r = 0; r + 1 < 5; ++r) {
-      for (Index c = 0; c + 1 < 9; ++c) {
-        const Index a = r * 9 + c;
-        mesh.faces.push_back({a, a + 1, a + 9});
-        mesh.faces.push_back({a + 1, a + 10, a + 9});
-      }
-    }
-    deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
-    message.header.stamp = ros::Time::now();
-    publisher.publish(message);
-  };
-  drop(0.31, -0.02, frame);
+  drop(0.31, -0.02, [&](double z) { publisher.publish(clothOf(5, 9, z)); });
   EXPECT_TRUE(rest.contacts.empty()) << "its own voxels are no obstacle";
   EXPECT_EQ(rest.suppressed_contacts, 0u);
   EXPECT_GT(touching(), 0u) << "the table is no part of the cloth";
-}
-
-/// 3 x 3 vertices, 0.05 m apart, of now.
-deformable_ccd::MeshStamped smallCloth(double z) {
-  Mesh mesh{grid(3, 3, 0.05, z), {}};
-  for (const Index a : {0u, 1u, 3u, 4u}) {
-    mesh.faces.push_back({a, a + 1, a + 3});
-    mesh.faces.push_back({a + 1, a + 4, a + 3});
-  }
-  deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
-  message.header.stamp = ros::Time::now();
-  return message;
 }
 
 struct DepthCamera : Preset {
@@ -310,7 +282,7 @@ TEST_F(DepthCamera, ClothOnWhatTheCameraSees) {
   int frames = 0;
   drop(0.1, -0.05, [&](double z) {
     if (frames++ % 3 == 0) points.publish(seen(frame));  // a camera at 10 Hz
-    publisher.publish(smallCloth(z));
+    publisher.publish(clothOf(3, 3, z));
   });
   // 150 mm in ten steps of 15 mm: the table is met in the seventh, two thirds of the way down.
   for (const auto& contact : metIn(6)) {
@@ -340,7 +312,7 @@ TEST_F(Realsense, ClothOnTheMapThatTheMonitorMakesItself) {
   int frames = 0;
   drop(0.1, -0.05, [&](double z) {
     if (frames++ % 6 == 0) points.publish(seen());  // a camera at 5 Hz
-    publisher.publish(smallCloth(z));
+    publisher.publish(clothOf(3, 3, z));
   });
   // 150 mm in ten steps of 15 mm: the voxels' top at 20 mm is met in the sixth, a third of the way down.
   const auto contacts_met = metIn(5);

@@ -6,17 +6,13 @@
 namespace dccd {
 namespace test {
 
-namespace {
-
-geometry_msgs::Point point(const Vec3& p) {
-  geometry_msgs::Point out;
-  out.x = p.x();
-  out.y = p.y();
-  out.z = p.z();
-  return out;
+std::vector<geometry_msgs::Point> pointsOf(const Positions& positions) {
+  std::vector<geometry_msgs::Point> points(positions.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].x = positions[i].x(), points[i].y = positions[i].y(), points[i].z = positions[i].z();
+  }
+  return points;
 }
-
-}  // namespace
 
 Mesh tipAbove(double z) {
   return {{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}, {3, 4, 5}}};
@@ -46,7 +42,7 @@ std_msgs::Header header(double stamp_s, const std::string& frame) {
 deformable_ccd::MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame) {
   deformable_ccd::MeshStamped out;
   out.header = header(stamp_s, frame);
-  for (const Vec3& p : mesh.positions) out.vertices.push_back(point(p));
+  out.vertices = pointsOf(mesh.positions);
   for (const Face& face : mesh.faces) {
     shape_msgs::MeshTriangle triangle;
     std::copy(face.begin(), face.end(), triangle.vertex_indices.begin());
@@ -97,9 +93,11 @@ visualization_msgs::MarkerArray soup(const Mesh& mesh, double stamp_s, int id) {
   marker.type = visualization_msgs::Marker::TRIANGLE_LIST;
   marker.pose.orientation.w = 1;
   marker.scale.x = marker.scale.y = marker.scale.z = 1;
+  Positions corners;
   for (const Face& face : mesh.faces) {
-    for (const Index v : face) marker.points.push_back(point(mesh.positions[v]));
+    for (const Index v : face) corners.push_back(mesh.positions[v]);
   }
+  marker.points = pointsOf(corners);
   visualization_msgs::MarkerArray out;
   out.markers.push_back(marker);
   return out;

@@ -26,6 +26,7 @@ Positions gridAt(std::size_t rows, std::size_t cols, double z);
 /// The same with triangles: as large as trackers send.
 Mesh sheetAt(double z, std::size_t rows = 30, std::size_t cols = 30);
 
+std::vector<geometry_msgs::Point> pointsOf(const Positions& positions);
 std_msgs::Header header(double stamp_s, const std::string& frame = "world");
 deformable_ccd::MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame = "world");
 sensor_msgs::PointCloud2 cloud(const Positions& positions, double stamp_s, const std::string& frame = "world");

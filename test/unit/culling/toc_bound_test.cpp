@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "oracle/exact_distance.h"
 #include "oracle/oracle.h"
 #include "support/generators.h"
 #include "support/step_support.h"
@@ -90,31 +89,6 @@ TEST(TocBound, ZeroOnlyWhereAllProjectionsOverlap) {
   }
   EXPECT_GT(zero, 1000u);
   EXPECT_GT(positive, 1000u);
-}
-
-// With a distance: before the bound the features are further apart than it.
-TEST(TocBound, NotCloserThanTheDistanceBeforeTheBound) {
-  const Draw draw = drawFrom(13);
-  std::size_t checked = 0;
-  for (int i = 0; i < 3000; ++i) {
-    const PairKind kind = i % 2 ? PairKind::EDGE_EDGE : PairKind::VERTEX_FACE;
-    PairMotion pair;
-    const int first = kind == PairKind::VERTEX_FACE ? 1 : 2;
-    for (int t = 0; t < 2; ++t) {
-      for (int p = 0; p < 4; ++p) {
-        for (double& x : pair.x[t][p]) x = draw(-9999, 9999) / 777.0;
-        if (t == 0 && p < first) pair.x[t][p][draw(0, 2)] += 15;
-      }
-    }
-    const double distance = draw(1, 100) / 77.0;
-    const double bound = std::min(boundOf(kind, pair, distance), 1.0);
-    if (bound == 0) continue;
-    for (const double part : {0.0, 0.5, 0.9, 1 - 0x1p-40}) {
-      ASSERT_FALSE(isWithin(kind, pair, part * bound, distance)) << "closer at " << part << " of the bound " << bound;
-      ++checked;
-    }
-  }
-  EXPECT_GT(checked, 1000u);
 }
 
 TEST(TocBound, OverflowIsNoEvidence) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <vector>
 
 #include "elementary/exact_integer.h"
 #include "elementary/exact_lazy_integer.h"

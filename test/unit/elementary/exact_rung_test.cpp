@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "dccd/elementary.h"
-#include "support/generators.h"
+#include "oracle/promises.h"
+#include "support/pair_list.h"
 #include "support/said.h"
 
 namespace dccd {
@@ -57,22 +58,19 @@ TEST(ExactRung, NamesThereAndBack) {
 // the batch knows stands.
 TEST(ExactRung, PastTheDeadlineNoSlowTierIsBegun) {
   constexpr std::size_t PAIRS = 600;
-  std::vector<VertexMotion> vertices;
-  std::vector<Quad> pairs;
+  test::PairList pairs;
   for (std::size_t i = 0; i < PAIRS; ++i) {
     // Everything falls into one point at the end of the step, and every third pair stays far apart.
+    PairMotion pair;
     for (int v = 0; v < 4; ++v) {
       const double x = 0.1 * v, y = v == 2 ? 0.3 : 0.07 * static_cast<double>(i % 7), z = v == 0 ? 0.2 : 1e-9 * v;
       const double apart = i % 3 == 0 && v == 0 ? 10 : 0;
-      vertices.push_back({{x, y, z + apart, 0}, {0.1, 0.2, 0.3 + apart, 0}});
+      std::copy_n(Vec3(x, y, z + apart).data(), 3, pair.x[0][v]);
+      std::copy_n(Vec3(0.1, 0.2, 0.3 + apart).data(), 3, pair.x[1][v]);
     }
-    const auto first = static_cast<Index>(4 * i);
-    pairs.push_back({first, first + 1, first + 2, first + 3});
+    pairs.add(pair);
   }
-  PairBatch batch;
-  batch.vertices = vertices.data();
-  batch.pairs = pairs.data();
-  batch.count = PAIRS;
+  PairBatch batch = batchOf(pairs);
   const auto rung = makeRung(AccuracyOptions());
   const auto run = [&](TierCounters& tiers) {
     std::vector<ElementaryResult> results(PAIRS);
@@ -100,17 +98,7 @@ TEST(ExactRung, PastTheDeadlineNoSlowTierIsBegun) {
 }
 
 TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
-  const VertexMotion vertices[4] = {};
-  const Quad quad = {0, 1, 2, 3};
-  const double separation = 0.001;
-  PairBatch batch;
-  batch.vertices = vertices;
-  batch.pairs = &quad;
-  batch.count = 1;
-  batch.minimum_separation_m = &separation;
-  ElementaryResult result;
-  TierCounters counters;
-  const std::string text = test::said<std::invalid_argument>([&] { makeRung({})->run(batch, &result, counters); });
+  const std::string text = test::said<std::invalid_argument>([] { test::testQuery(*makeRung({}), {}, 0.001); });
   EXPECT_NE(text.find("conservative"), std::string::npos);
 }
 

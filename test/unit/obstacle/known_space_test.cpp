@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <random>
 #include <stdexcept>
 
 #include "obstacle/voxel_surface_impl.h"

@@ -1,8 +1,6 @@
 // Octomaps built of known shapes, read back by OctoMap itself.
 #include "octomap/map_builder.h"
 
-#include <limits>
-#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>

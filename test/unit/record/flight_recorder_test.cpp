@@ -1,7 +1,6 @@
 #include "record/flight_recorder.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <set>
 

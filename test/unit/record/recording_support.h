@@ -1,5 +1,8 @@
-// What the tests of recordings share: the options of a scene, and the error that bytes lead to.
+// What the tests of recordings share: the options of a scene, a recording's way through bytes, and the error that bytes
+// lead to.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <cstdint>
 #include <string>
@@ -7,6 +10,7 @@
 
 #include "dccd/stream.h"
 #include "record/step_recording.h"
+#include "support/recordings.h"
 #include "support/said.h"
 
 namespace dccd {
@@ -14,6 +18,14 @@ namespace test {
 
 inline std::string errorOf(const std::vector<std::uint8_t>& bytes) {
   return said<RecordingError>([&] { readRecording(bytes.data(), bytes.size(), "FILE"); });
+}
+
+/// As it is read after it was written, and would be written again.
+inline StepRecording again(const StepRecording& recording) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recording);
+  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(recordingBytes(read), bytes);
+  return read;
 }
 
 inline MonitorOptions with(Accuracy rung) {

@@ -19,8 +19,7 @@ namespace {
 TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
   const std::string before = simdTarget();
   for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
-    const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(with(rung)));
-    const StepRecording r = readRecording(bytes.data(), bytes.size(), "FILE");
+    const StepRecording r = again(recordScene(with(rung)));
     ASSERT_FALSE(r.answer.contacts.empty()) << toString(rung);
     for (const std::string& target : simdTargets()) {
       setSimdTarget(target);
@@ -37,10 +36,7 @@ TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
 
 TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
   const StepRecording without = recordScene(with(Accuracy::CONSERVATIVE));
-  StepRecording r = recordScene(with(Accuracy::CONSERVATIVE), true, true);
-  const std::vector<std::uint8_t> bytes = recordingBytes(r);
-  r = readRecording(bytes.data(), bytes.size(), "FILE");
-  EXPECT_EQ(recordingBytes(r), bytes);
+  const StepRecording r = again(recordScene(with(Accuracy::CONSERVATIVE), true, true));
   ASSERT_EQ(r.step.bodies[0].radius_m->size(), 20u);
   EXPECT_EQ((*r.step.bodies[0].radius_m)[7], 3e-3);
   ASSERT_TRUE(r.step.bodies[0].reference) << "its first frame";
@@ -79,8 +75,7 @@ TEST(StepReplay, WithoutAMapTheStatusIsTheSame) {
 TEST(StepReplay, WhatWasLeftOutBeforeTheStepIsNoDifference) {
   MonitorOptions options;
   options.detector.excluded = {"rigid body 'finger' by effects/rigid_bodies: off"};
-  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(options));
-  const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  const StepRecording read = again(recordScene(options));
   ASSERT_FALSE(read.answer.excluded.empty());
   EXPECT_TRUE(read.options.excluded.empty()) << "no option that changes an answer";
   EXPECT_TRUE(replayStep(read).differences.empty());
@@ -204,8 +199,7 @@ TEST(StepReplay, PatchesOfExpectedContactsAreMadeAgain) {
   MonitorOptions options = expecting();
   options.detector.patches = true;
   const StepRecording r = recordScene(options);
-  const std::vector<std::uint8_t> bytes = recordingBytes(r);
-  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  StepRecording read = again(r);
   EXPECT_EQ(read.answer.patch_of, r.answer.patch_of);
   const auto expected = std::find_if(read.answer.patches.begin(), read.answer.patches.end(),
                                      [](const Patch& patch) { return patch.expected > 0; });
@@ -216,15 +210,12 @@ TEST(StepReplay, PatchesOfExpectedContactsAreMadeAgain) {
 }
 
 TEST(StepReplay, ImpossibleOptionsAreRefused) {
-  StepRecording r = recordScene();
-  r.options.max_substeps = 0;
-  EXPECT_THROW(replayStep(r), std::invalid_argument);
-  r = recordScene();
-  r.step.bodies.clear();
-  EXPECT_THROW(replayStep(r), std::invalid_argument);
-  r = recordScene();
-  r.options.accuracy.toc_bits = 99;
-  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  const StepRecording good = recordScene();
+  StepRecording uncut = good, empty = good, fine = good;
+  uncut.options.max_substeps = 0;
+  empty.step.bodies.clear();
+  fine.options.accuracy.toc_bits = 99;
+  for (const StepRecording* r : {&uncut, &empty, &fine}) EXPECT_THROW(replayStep(*r), std::invalid_argument);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <random>
-#include <sstream>
 
 #include "dccd/tolerances.h"
 #include "node/map_loader.h"

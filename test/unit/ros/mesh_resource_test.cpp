@@ -4,14 +4,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <sstream>
 #include <stdexcept>
 
 #include "support/data.h"
@@ -173,120 +170,6 @@ TEST_F(OddFiles, WhatIsNoFileOrTooLargeIsNotOpened) {
     EXPECT_TRUE(mentions(errorOf(path), "cannot be opened")) << errorOf(path);
   }
   EXPECT_TRUE(mentions(errorOf(write("a.step", "")), "STL, OBJ, PLY and DAE can be read"));
-}
-
-/// Corners of polygons to a Collada file of one mesh, in metres.
-std::string colladaOf(const std::string& corners, const std::string& primitives) {
-  const auto count = [](const std::string& text) {
-    std::istringstream words(text);
-    return std::distance(std::istream_iterator<std::string>(words), std::istream_iterator<std::string>());
-  };
-  const auto n = count(corners);
-  return "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
-         "<asset><unit name=\"meter\" meter=\"1\"/><up_axis>Z_UP</up_axis></asset><library_geometries><geometry "
-         "id=\"g\">"
-         "<mesh><source id=\"p\"><float_array id=\"a\" count=\"" +
-         std::to_string(n) + "\">" + corners + "</float_array><technique_common><accessor source=\"#a\" count=\"" +
-         std::to_string(n / 3) +
-         "\" stride=\"3\"><param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/><param name=\"Z\" "
-         "type=\"float\"/></accessor></technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" "
-         "source=\"#p\"/></vertices>" +
-         primitives +
-         "</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\"><node id=\"n\">"
-         "<instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes><scene><instance_visual_scene "
-         "url=\"#s\"/></scene></COLLADA>";
-}
-std::string polylist(const std::string& counts, const std::string& indices, int polygons) {
-  return "<polylist count=\"" + std::to_string(polygons) +
-         "\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><vcount>" + counts + "</vcount><p>" + indices +
-         "</p></polylist>";
-}
-
-/// Twice the area in the plane of x and y: of all triangles together, and of the outline.
-double areaOf(const MeshResource& mesh) {
-  double sum = 0;
-  for (const Face& f : mesh.topology->faces()) {
-    const Vec3 u = mesh.positions[f[1]] - mesh.positions[f[0]], v = mesh.positions[f[2]] - mesh.positions[f[0]];
-    sum += std::abs(u.x() * v.y() - u.y() * v.x());
-  }
-  return sum;
-}
-
-/// An L and a dart, flat and on a slope, and one so thin that single precision just tells its corners apart: each
-/// format gives triangles that fill the outline and no more, and the same ones.
-TEST_F(OddFiles, ConcavePolygonsStayInTheirOutlineInEachFormat) {
-  struct Shape {
-    std::vector<Vec3> corners;
-    double twice_area;
-  };
-  const double thin = 1.0 / 1048576;
-  const Shape shapes[] = {
-      {{{3, 0, 0}, {3, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}, {0, 0, 0}}, 10},
-      {{{0, 0, 0}, {2, 1, 0}, {0, 2, 0}, {1.5, 1, 0}}, 1},
-      {{{0, 0, 0}, {2, 1, 1}, {0, 2, 2}, {1.5, 1, 1}}, 1},
-      {{{3, 0, 1.5}, {3, 1, 1.5}, {1, 1, 0.5}, {1, 3, 0.5}, {0, 3, 0}, {0, 0, 0}}, 10},
-      {{{0, 0, 0}, {2, thin, 0}, {0, 2 * thin, 0}, {1.5, thin, 0}}, thin},
-  };
-  for (const Shape& shape : shapes) {
-    const std::size_t n = shape.corners.size();
-    std::ostringstream obj, xyz, list;
-    for (std::ostringstream* text : {&obj, &xyz}) text->precision(17);
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec3& p = shape.corners[i];
-      xyz << p.x() << ' ' << p.y() << ' ' << p.z() << '\n';
-      obj << "v " << p.x() << ' ' << p.y() << ' ' << p.z() << '\n';
-      list << ' ' << i;
-    }
-    obj << 'f';
-    for (std::size_t i = 1; i <= n; ++i) obj << ' ' << i;
-    const std::string count = std::to_string(n);
-    const std::string ply = "ply\nformat ascii 1.0\nelement vertex " + count +
-                            "\nproperty double x\nproperty double y\nproperty double z\nelement face 1\n"
-                            "property list uchar int vertex_indices\nend_header\n" +
-                            xyz.str() + count + list.str() + '\n';
-    const MeshResource from_obj = loadMeshResource(write("a.obj", obj.str() + '\n'), 1);
-    const MeshResource from_ply = loadMeshResource(write("a.ply", ply), 1);
-    const MeshResource from_dae =
-        loadMeshResource(write("a.dae", colladaOf(xyz.str(), polylist(count, list.str(), 1))), 1);
-    EXPECT_EQ(areaOf(from_obj), shape.twice_area);
-    EXPECT_EQ(from_obj.topology->faces().size(), n - 2);
-    EXPECT_EQ(from_obj.dropped_faces, 0u);
-    EXPECT_EQ(from_ply.topology->faces(), from_obj.topology->faces());
-    EXPECT_EQ(from_dae.topology->faces(), from_obj.topology->faces());
-    for (std::size_t i = 0; i < n; ++i) EXPECT_NEAR((from_dae.positions[i] - shape.corners[i]).norm(), 0, 1e-12);
-  }
-}
-
-/// Two triangles, a face that is only the diagonal's other side, one that is an edge of a triangle, and a bow tie.
-TEST_F(OddFiles, FacesThatCannotBeUsedAreCountedInEachFormat) {
-  const std::string xyz = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
-  const std::string head =
-      "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement face "
-      "5\nproperty list uchar int vertex_indices\nend_header\n";
-  const auto expect = [](const MeshResource& mesh, std::uint64_t dropped) {
-    EXPECT_EQ(mesh.dropped_faces, dropped);
-    EXPECT_EQ(mesh.topology->faces(), (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
-  };
-  const std::string obj = write("a.obj",
-                                "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 2 4 4\nf 1 2 2\n"
-                                "f 1 3 2 4\n");
-  expect(loadMeshResource(obj, 1), 2);
-  expect(loadTopologyFile(obj), 2);
-  const std::string ply = write("a.ply", head + xyz + "3 0 1 2\n3 0 2 3\n2 1 3\n2 0 1\n4 0 2 1 3\n");
-  expect(loadMeshResource(ply, 1), 2);
-  expect(loadTopologyFile(ply), 2);
-  expect(
-      loadMeshResource(write("a.dae", colladaOf(xyz, polylist("3 3 3 3 4", "0 1 2 0 2 3 1 3 3 0 1 1 0 2 1 3", 5))), 1),
-      2);
-  std::string stl = "solid a\n";
-  for (const char* facet : {"0 0 0 1 0 0 1 1 0", "0 0 0 1 1 0 0 1 0", "1 0 0 0 1 0 0 1 0", "0 0 0 1 0 0 1 0 0"}) {
-    std::istringstream in(facet);
-    stl += "facet normal 0 0 1\nouter loop\n";
-    for (std::string x, y, z; in >> x >> y >> z;) stl += "vertex " + x + ' ' + y + ' ' + z + '\n';
-    stl += "endloop\nendfacet\n";
-  }
-  expect(loadMeshResource(write("a.stl", stl + "endsolid a\n"), 1), 1);
-  expect(loadTopologyFile(write("a.stl", stl + "endsolid a\n")), 1);
 }
 
 TEST_F(OddFiles, TheGroupOfAPolygonIsTheFacesThatItBecame) {

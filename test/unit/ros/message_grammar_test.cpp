@@ -7,13 +7,13 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
 
 #include "deformable_ccd/MeshStamped.h"
 #include "input/mesh_decoder.h"
+#include "ros/support/meshes.h"
 #include "support/said.h"
 
 namespace dccd {
@@ -65,15 +65,6 @@ class MessageGrammar : public ::testing::Test {
  private:
   std::optional<MeshDecoder> decoder_, of_objects_;
 };
-
-template <typename Point = geometry_msgs::Point>
-std::vector<Point> pointsOf(const Positions& positions) {
-  std::vector<Point> points(positions.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    points[i].x = positions[i].x(), points[i].y = positions[i].y(), points[i].z = positions[i].z();
-  }
-  return points;
-}
 
 // --- sensor_msgs/PointCloud2
 
@@ -283,18 +274,8 @@ TEST_F(HeaderGrammar, Frames) {
 // --- deformable_ccd/MeshStamped and shape_msgs/Mesh
 
 struct IndexedGrammar : MessageGrammar {
-  static deformable_ccd::MeshStamped mesh(const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                                          const Positions& positions = SQUARE) {
-    deformable_ccd::MeshStamped out;
-    out.header.stamp = ros::Time(5);
-    out.header.frame_id = "world";
-    out.vertices = pointsOf(positions);
-    for (const auto& t : triangles) {
-      shape_msgs::MeshTriangle triangle;
-      std::copy(t.begin(), t.end(), triangle.vertex_indices.begin());
-      out.triangles.push_back(triangle);
-    }
-    return out;
+  static deformable_ccd::MeshStamped mesh(const std::vector<Face>& triangles, const Positions& positions = SQUARE) {
+    return test::meshStamped({positions, triangles}, 5);
   }
 };
 
@@ -319,13 +300,13 @@ TEST_F(IndexedGrammar, TrianglesSentOnce) {
   EXPECT_TRUE(mentions(refusalOf(mesh({})), "no triangles"));
   const DecodedMesh first = read(mesh({{0, 1, 2}, {0, 2, 3}}));
   EXPECT_EQ(read(mesh({})).topology, first.topology);
+  EXPECT_EQ(read(mesh({{0, 1, 2}, {0, 2, 3}})).topology, first.topology);
+  EXPECT_NE(read(mesh({{0, 1, 2}})).topology, first.topology);
   EXPECT_TRUE(mentions(refusalOf(mesh({}, {SQUARE[0], SQUARE[1], SQUARE[2]})), "VERTEX_COUNT"));
 }
 
 TEST_F(IndexedGrammar, WithoutAHeader) {
-  shape_msgs::Mesh bare;
-  bare.vertices = pointsOf(SQUARE);
-  bare.triangles = mesh({{0, 1, 2}}).triangles;
+  const shape_msgs::Mesh bare = test::shapeMesh({SQUARE, {{0, 1, 2}}});
   EXPECT_TRUE(mentions(refusalOf(bare), "set parameter frame_id"));
   anew();
   config.frame_id = "world";
@@ -377,7 +358,7 @@ struct MarkerGrammar : MessageGrammar {
     out.id = 2;
     out.type = visualization_msgs::Marker::TRIANGLE_LIST;
     out.pose.orientation.w = 1;
-    out.points = pointsOf(corners);
+    out.points = test::pointsOf(corners);
     return out;
   }
 };
@@ -585,7 +566,7 @@ struct PoseArrayGrammar : RopeGrammar {
     out.header.frame_id = "world";
     out.poses.resize(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
-      out.poses[i].position = pointsOf(points)[i];
+      out.poses[i].position = test::pointsOf(points)[i];
       out.poses[i].orientation.x = NOT_A_NUMBER;  // of no matter
     }
     return out;

@@ -298,8 +298,10 @@ TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
   cut.total_contacts = 7;
   cut.counts = {5, 2, 3, 1, 4, 3, 6, 2};
   cut.stats.unfolded_bodies = 2;
+  cut.substeps = 13;
   const auto stats = toStepStats(cut, {}, "world");
   EXPECT_EQ(stats.unfolded_bodies, 2u);
+  EXPECT_EQ(stats.substeps, 13u);
   EXPECT_EQ(stats.contacts, 7u);
   EXPECT_EQ(stats.contacts_certain, 5u);
   EXPECT_EQ(stats.contacts_undecided, 2u);

@@ -3,7 +3,6 @@
 // sides with the cloth within it, nor between it and the clear step before, and nothing newer may have been left out.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <map>
