@@ -7,7 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "support/detector.h"
+#include "support/said.h"
+#include "unit/step/two_sheets.h"
 
 namespace dccd {
 namespace test {
@@ -15,32 +16,9 @@ namespace {
 
 constexpr double LOST = std::numeric_limits<double>::quiet_NaN();
 
-std::shared_ptr<const Topology> sheet() { return std::make_shared<const Topology>(Topology::grid(4, 4)); }
-
-Positions sheetAt(double z) {
-  Positions points;
-  for (int i = 0; i < 16; ++i) points.push_back({0.1 * (i % 4), 0.1 * (i / 4), z + 0.001 * ((7 * i) % 5)});
-  return points;
-}
-
 /// A sheet that comes down on another one, and stays 5 cm above it.
-struct Asked {
-  Step step;
-  Options options;
-
-  Asked() {
-    Body upper, lower;
-    upper.name = "upper";
-    lower.name = "lower";
-    upper.topology = lower.topology = sheet();
-    step.bodies = {moving(upper, sheetAt(0.3), sheetAt(0.05)), moving(lower, sheetAt(0), sheetAt(0))};
-    step.stamp_ns = 100000000;
-  }
-  Body& upper() { return step.bodies[0]; }
-  Outcome answer() const {
-    History history;
-    return detect(step, options, history);
-  }
+struct Asked : TwoSheets {
+  Asked() : TwoSheets(0.3, 0.05) {}
 };
 
 void move(Body& body, double z0, double z1) {
@@ -48,11 +26,9 @@ void move(Body& body, double z0, double z1) {
   body.t1 = share(sheetAt(z1));
 }
 
-bool mentions(const std::vector<std::string>& sentences, const std::string& words) {
-  for (const std::string& sentence : sentences) {
-    if (sentence.find(words) != std::string::npos) return true;
-  }
-  return false;
+bool oneMentions(const std::vector<std::string>& sentences, const std::string& words) {
+  return std::any_of(sentences.begin(), sentences.end(),
+                     [&](const std::string& sentence) { return mentions(sentence, words); });
 }
 
 void lose(Asked& asked) {
@@ -61,9 +37,7 @@ void lose(Asked& asked) {
   asked.upper().t1 = share(t1);
 }
 
-void loosen(Asked& asked) {
-  asked.upper().topology = std::make_shared<const Topology>(Topology::fromTriangles(16, {{0, 1, 2}}));
-}
+void loosen(Asked& asked) { asked.upper().topology = share(Topology::fromTriangles(16, {{0, 1, 2}})); }
 
 void turnFar(Asked& asked) {
   asked.upper().turns = asked.upper().rigid = true;
@@ -117,7 +91,7 @@ TEST(Assurance, EachLineOfTheListTakesTheProofAway) {
     const Assurance assurance = assuranceOf(outcome);
     EXPECT_FALSE(assurance.proved) << "without " << missing.what;
     EXPECT_FALSE(assurance.clear()) << "without " << missing.what;
-    EXPECT_TRUE(mentions(assurance.missing, missing.sentence)) << missing.what << ": " << describe(assurance);
+    EXPECT_TRUE(oneMentions(assurance.missing, missing.sentence)) << missing.what << ": " << describe(assurance);
     EXPECT_TRUE(outcome.answered) << missing.what;
   }
 }
@@ -145,7 +119,7 @@ TEST(Assurance, ABodyOfWhichEveryVertexIsMaskedIsNotProved) {
   EXPECT_TRUE(assuranceOf(asked.answer()).proved);
   // A vertex of no face makes no difference: there is nothing to look at.
   asked.upper().topology = share(Topology::fromTriangles(16, {{0, 1, 2}}));
-  EXPECT_TRUE(mentions(assuranceOf(asked.answer()).missing, "nothing of it was checked"));
+  EXPECT_TRUE(oneMentions(assuranceOf(asked.answer()).missing, "nothing of it was checked"));
 }
 
 TEST(Assurance, WhatIsLeftOutByChoiceIsNamedAndTakesNothingAway) {
@@ -158,11 +132,12 @@ TEST(Assurance, WhatIsLeftOutByChoiceIsNamedAndTakesNothingAway) {
   EXPECT_TRUE(assurance.proved) << describe(assurance);
   for (const char* sentence : {"body 'upper': 2 vertices by vertex_mask", "body 'upper': not against itself",
                                "body 'upper': not against the map", "0 voxels of the map by exclude_boxes"}) {
-    EXPECT_TRUE(mentions(assurance.excluded, sentence)) << sentence;
+    EXPECT_TRUE(oneMentions(assurance.excluded, sentence)) << sentence;
   }
   EXPECT_EQ(assurance.excluded.size(), 4u);
   asked.options.excluded = {"rigid body 'finger' by effects/rigid_bodies: off"};
-  EXPECT_TRUE(mentions(assuranceOf(asked.answer()).excluded, "'finger'")) << "what was taken away before the step, too";
+  EXPECT_TRUE(oneMentions(assuranceOf(asked.answer()).excluded, "'finger'"))
+      << "what was taken away before the step, too";
   // A vertex of no face that is masked is left out by choice, too.
   Asked loose;
   loosen(loose);
@@ -204,7 +179,7 @@ TEST(Assurance, TouchingTellsWhatLastsFromWhatIsNew) {
 
 TEST(Assurance, RopesWithoutAMapHaveNoInside) {
   Asked asked;
-  const auto rope = std::make_shared<const Topology>(Topology::polyline(16));
+  const auto rope = share(Topology::polyline(16));
   for (Body& body : asked.step.bodies) body.topology = rope;
   const Outcome outcome = asked.answer();
   EXPECT_EQ(outcome.start_state, StartState::CLEAR);

@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-#include "support/step_support.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -17,13 +17,7 @@ struct Waved {
   std::vector<Body> setups;
   Positions rest, moving;
   Waved() {
-    const auto topology = std::make_shared<const Topology>(Topology::grid(9, 9));
-    for (int b = 0; b < 2; ++b) {
-      Body body;
-      body.name = b ? "waved" : "resting";
-      body.topology = topology;
-      setups.push_back(body);
-    }
+    for (const char* name : {"resting", "waved"}) setups.push_back(bodyOf(name, Topology::grid(9, 9)));
     for (int i = 0; i < 81; ++i) rest.emplace_back(0.1 * (i % 9), 0.1 * (i / 9), 0.01 * ((i * 7) % 5));
     moving = at(0);
   }
@@ -38,13 +32,11 @@ TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
   const Waved scene;
   Detector detector;
   const auto run = [&](double away) {
-    Positions t0 = scene.moving, t1 = scene.at(5);
-    for (Vec3& p : t0) p.x() += away;
     Step step;
-    step.bodies = {test::moving(scene.setups[0], scene.rest, scene.rest), test::moving(scene.setups[1], t0, t1)};
+    step.bodies = {test::moving(scene.setups[0], scene.rest, scene.rest),
+                   test::moving(scene.setups[1], movedBy(scene.moving, {away, 0, 0}), scene.at(5))};
     const Outcome result = detector.run(step);
-    Detector fresh;
-    EXPECT_EQ(difference(result.contacts, fresh.run(step).contacts), "") << away;
+    EXPECT_EQ(difference(result.contacts, Detector().run(step).contacts), "") << away;
     return result.stats.bodies_kept;
   };
   run(0);
@@ -59,8 +51,7 @@ TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
 TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
   const Waved scene;
   Detector detector;
-  Positions rest = scene.rest, beside = rest;
-  for (Vec3& p : beside) p += Vec3(0.03, 0.02, 0.03);  // so near that both need bounds
+  const Positions rest = scene.rest, beside = movedBy(rest, {0.03, 0.02, 0.03});  // so near that both need bounds
   const auto run = [&](const Positions& t0, const Positions& t1) {
     Step step;
     step.bodies = {test::moving(scene.setups[0], t0, t1), test::moving(scene.setups[1], beside, beside)};
@@ -113,9 +104,7 @@ TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
         keeps.history().clear();
         forgets.history().clear();
       }
-      if (oneIn(15)) {  // a teleport
-        for (Vec3& p : at[1]) p.x() += 0.2;
-      }
+      if (oneIn(15)) at[1] = movedBy(at[1], {0.2, 0, 0});  // a teleport
       Step step;
       for (int b = 0; b < (both ? 2 : 1); ++b) {
         Positions t1 = oneIn(6) ? scene.at(k + 7 * b) : at[b];
@@ -129,9 +118,7 @@ TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
       ASSERT_EQ(difference(a.contacts, b.contacts), "") << where;
       ASSERT_EQ(a.status, b.status) << where;
       ASSERT_EQ(a.start_state, b.start_state) << where;
-      ASSERT_TRUE(std::equal(a.intersections.begin(), a.intersections.end(), b.intersections.begin(),
-                             b.intersections.end(), [](const auto& x, const auto& y) { return x == y; }))
-          << where;
+      ASSERT_TRUE(same(a.intersections, b.intersections)) << where;
       EXPECT_EQ(b.stats.bodies_kept, 0u);
       kept += a.stats.bodies_kept;
       contacts += a.contacts.size();
@@ -142,26 +129,17 @@ TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
 }
 
 TEST(BodiesApart, AreNotPaired) {
-  const auto topology = std::make_shared<const Topology>(Topology::grid(4, 4));
-  std::vector<Positions> x(5);
-  std::vector<Body> setups(5);
   Step step;
-  for (std::size_t b = 0; b < 5; ++b) {
-    setups[b].name = std::to_string(b);
-    setups[b].topology = topology;
+  for (int b = 0; b < 5; ++b) {
     // Bodies 0 and 1 overlap, all others are far from each other.
-    for (int i = 0; i < 16; ++i)
-      x[b].emplace_back(i % 4 + (b < 2 ? 0.0 : 10.0 * static_cast<double>(b)), i / 4, 0.1 * b);
+    const Positions x = gridAt(4, 4, 1, b < 2 ? Vec3(0, 0, 0) : Vec3(10 * b, 0, 0.1 * b));
+    step.bodies.push_back(moving(bodyOf(std::to_string(b), Topology::grid(4, 4)), x, x));
   }
-  for (Vec3& p : x[1]) p.z() = 0;
-  for (std::size_t b = 0; b < 5; ++b) step.bodies.push_back(moving(setups[b], x[b], x[b]));
   Detector detector;
   const Outcome result = detector.run(step);
   EXPECT_EQ(result.stats.body_pairs, 1u);
   EXPECT_GT(result.stats[Effect::BODY_BODY].in, 0u);
-  Positions away = x[1];
-  for (Vec3& p : away) p.y() += 50;
-  step.bodies[1] = moving(setups[1], away, away);
+  step.bodies[1].t0 = step.bodies[1].t1 = share(gridAt(4, 4, 1, {0, 50, 0}));
   const Outcome none = detector.run(step);
   EXPECT_EQ(none.stats.body_pairs, 0u);
   EXPECT_EQ(none.stats[Effect::BODY_BODY].in, 0u);

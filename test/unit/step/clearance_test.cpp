@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <new>
 
 #include "support/closed_meshes.h"
-#include "support/detector.h"
-#include "support/step_support.h"
-#include "unit/allocations.h"
+#include "support/looks.h"
+#include "support/said.h"
+#include "support/shapes.h"
+#include "unit/failing_allocations.h"
 
 namespace dccd {
 namespace test {
@@ -21,26 +21,23 @@ Options asking(double max_m = 10) {
   return options;
 }
 
-Body bodyOf(const char* name, const Topology& topology) {
-  Body body;
-  body.name = name;
-  body.topology = share(topology);
-  return body;
-}
-
-Positions movedBy(Positions positions, const Vec3& by) {
-  for (Vec3& p : positions) p += by;
-  return positions;
-}
-
 /// One triangle in the plane z = 0.
 const Topology TRIANGLE = Topology::fromTriangles(3, {{0, 1, 2}});
 const Positions FLAT{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
 
-/// Two triangles, `above_m` apart at t0 and `end_m` at t1.
-Step twoTriangles(double above_m, double end_m) {
+/// Two triangles, one at rest.
+Step twoTriangles(const Vec3& from, const Vec3& to) {
   Step step = stepOf(bodyOf("low", TRIANGLE), FLAT, FLAT);
-  step.bodies.push_back(moving(bodyOf("high", TRIANGLE), movedBy(FLAT, {0, 0, above_m}), movedBy(FLAT, {0, 0, end_m})));
+  step.bodies.push_back(moving(bodyOf("high", TRIANGLE), movedBy(FLAT, from), movedBy(FLAT, to)));
+  return step;
+}
+/// Of which one is `above_m` above the other at t0 and `end_m` at t1.
+Step twoTriangles(double above_m, double end_m) { return twoTriangles({0, 0, above_m}, {0, 0, end_m}); }
+
+/// Two bodies at rest.
+Step resting(const Body& a, const Positions& at, const Body& b, const Positions& there) {
+  Step step = stepOf(a, at, at);
+  step.bodies.push_back(moving(b, there, there));
   return step;
 }
 
@@ -74,10 +71,7 @@ TEST(Clearance, OfTwoTrianglesThatComeNear) {
 
 TEST(Clearance, IsLeastWithinTheStep) {
   // The corner of one passes the other's at a distance of 0.3, at half of the step.
-  Step step = stepOf(bodyOf("low", TRIANGLE), FLAT, FLAT);
-  const Positions left = movedBy(FLAT, {-5, 0, 0.3}), right = movedBy(FLAT, {5, 0, 0.3});
-  step.bodies.push_back(moving(bodyOf("high", TRIANGLE), left, right));
-  const Clearance row = rowOf(distance(step, asking()), 0, 1);
+  const Clearance row = rowOf(distance(twoTriangles({-5, 0, 0.3}, {5, 0, 0.3}), asking()), 0, 1);
   expectMeasured(row.over_step, 0.3);
   EXPECT_NEAR(row.over_step.t, 0.5, 0.1);
   expectMeasured(row.at_end, std::hypot(4, 0.3));
@@ -107,8 +101,7 @@ TEST(Clearance, OfWhatTouchesIsNothing) {
 
 TEST(Clearance, SeesAnEdgeThroughTheMiddleOfAFace) {
   const Positions big{{-9, -9, 0}, {9, -9, 0}, {0, 9, 0}}, upright{{0, 0, -3}, {0, 0, 3}, {0, 1, 3}};
-  Step step = stepOf(bodyOf("floor", TRIANGLE), big, big);
-  step.bodies.push_back(moving(bodyOf("blade", TRIANGLE), upright, upright));
+  const Step step = resting(bodyOf("floor", TRIANGLE), big, bodyOf("blade", TRIANGLE), upright);
   const Clearance row = rowOf(distance(step, asking()), 0, 1);
   EXPECT_EQ(row.at_end.status, ClearanceStatus::TOUCHING) << "corners and edges are a metre and more away";
   EXPECT_EQ(row.over_step.status, ClearanceStatus::TOUCHING) << "no contact, but they cross from the start";
@@ -117,10 +110,8 @@ TEST(Clearance, SeesAnEdgeThroughTheMiddleOfAFace) {
 
 TEST(Clearance, IsFromTheSurfaceOfWhatIsInside) {
   const StepBody large = box({-5, -5, -5}, {5, 5, 5}), small = box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
-  Step step = stepOf(bodyOf("large", large.topology), large.t0, large.t1);
-  step.bodies.push_back(moving(bodyOf("small", small.topology), small.t0, small.t1));
-  History history;
-  const Outcome outcome = detect(step, asking(), history);
+  const Outcome outcome = Detector(asking()).run(
+      resting(bodyOf("large", large.topology), large.t0, bodyOf("small", small.topology), small.t0));
   ASSERT_EQ(outcome.start_state, StartState::INTERSECTING);
   expectMeasured(rowOf(outcome.clearances, 0, 1).over_step, 4.5);
 }
@@ -129,17 +120,13 @@ TEST(Clearance, OfABoxAndThreeVoxelsIsFortyCentimetres) {
   // ../shared/cases/README.md: distances of octrees that are metres off elsewhere.
   const StepBody cube = box({9.5, -0.5, -0.5}, {10.5, 0.5, 0.5});
   Step step = stepOf(bodyOf("box", cube.topology), cube.t0, cube.t1);
-  const auto voxel = [](double x, double y, double z) {
-    const auto key = [](double c) { return static_cast<std::uint16_t>(std::floor(c / 0.1 + 1e-9) + 32768); };
-    return OccupiedLeaf{{key(x), key(y), key(z)}, 1};
-  };
-  step.map.surface = VoxelSurface::build(0.1, {voxel(1, 0, 0), voxel(9, 0, 0), voxel(12, 0, 1)});
+  step.map.surface = VoxelSurface::build(0.1, {voxelAt(10, 0, 0), voxelAt(90, 0, 0), voxelAt(120, 0, 10)});
   const Clearance row = rowOf(distance(step, asking()), 0, OBSTACLE_BODY);
   expectMeasured(row.at_end, 0.4, 1e-4);
   expectMeasured(row.over_step, 0.4, 1e-4);
   EXPECT_NEAR(row.at_end.point[0].x(), 9.5, 1e-6);
   EXPECT_NEAR(row.at_end.point[1].x(), 9.1, 1e-6);
-  EXPECT_EQ(row.at_end.voxel, voxel(9, 0, 0).min);
+  EXPECT_EQ(row.at_end.voxel, voxelAt(90, 0, 0).min);
   EXPECT_EQ(row.at_end.voxel_size, 1u);
   Step turned = step;  // the same in a map of another frame
   turned.map.map_from_fixed.linear() = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix();
@@ -206,14 +193,9 @@ Positions folded(double gap_m) {
 }
 
 TEST(Clearance, OfAFoldIsFromLayerToLayer) {
-  Positions flat;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 21; ++k) flat.emplace_back(k * 0.1, i * 0.1, 0);
-  }
+  const Positions flat = gridAt(3, 21, 0.1);
   Body cloth = bodyOf("cloth", Topology::grid(3, 21));
-  ReferenceFrame reference;
-  reference.positions = flat;
-  cloth.reference = share(reference);
+  cloth.reference = share(ReferenceFrame{flat, {}});
   Options options = asking();
   options.clearance.self_m = 0.45;
   expectMeasured(rowOf(distance(stepOf(cloth, folded(0.07), folded(0.05)), options), 0, 0).over_step, 0.05);
@@ -261,9 +243,7 @@ TEST(Clearance, OfATurningBodyIsAlongThePathThatIsTested) {
   step.bodies.push_back(moving(bodyOf("post", TRIANGLE), movedBy(FLAT, beside), movedBy(FLAT, beside)));
   Options options = asking();
   options.rigid_tolerance_m = 1e-3;
-  step.bodies[1].minimum_separation_m = 0;
-  History history;
-  const Outcome outcome = detect(step, options, history);
+  const Outcome outcome = Detector(options).run(step);
   ASSERT_GT(outcome.substeps, 1u);
   const Clearance row = rowOf(outcome.clearances, 0, 1);
   EXPECT_EQ(row.over_step.status, ClearanceStatus::MEASURED);
@@ -286,8 +266,7 @@ TEST(Clearance, IsAskedOfThoseThatMeet) {
   step.bodies[0].not_against = {1};
   step.bodies[1].rigid = true;
   EXPECT_EQ(distance(step, asking()).size(), 1u) << "the first one with itself";
-  History history;
-  EXPECT_TRUE(detect(step, Options(), history).clearances.empty()) << "nobody asks";
+  EXPECT_TRUE(Detector().run(step).clearances.empty()) << "nobody asks";
 }
 
 bool sameBits(const Clearance& x, const Clearance& y) {
@@ -352,13 +331,7 @@ Step wavySheets(double phase) {
     }
     step.bodies.push_back(moving(bodyOf(b ? "upper" : "lower", grid), t0, t1));
   }
-  std::vector<OccupiedLeaf> table;
-  for (int x = 0; x < 30; ++x) {
-    for (int y = 0; y < 20; ++y) {
-      table.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32767}, 1});
-    }
-  }
-  step.map.surface = VoxelSurface::build(0.05, table);
+  step.map.surface = VoxelSurface::build(0.05, voxelsOfBox({0, 0, -1}, {30, 20, 0}));
   return step;
 }
 
@@ -388,21 +361,14 @@ struct Asked {
 /// ever.
 void expectNothingHalfDone(const Asked& before, const Asked& failing, const Asked& last) {
   const std::vector<Clearance> expected = distance(last.step, last.options);
-  int n = 0;
-  for (bool met = true; met && !testing::Test::HasFailure(); ++n) {
+  const int allocations = failingEverywhere([&](int n) {
     History history;
     detect(before.step, before.options, history);
-    {
-      const AllocationFailure failure(n, false);
-      try {
-        detect(failing.step, failing.options, history);
-      } catch (const std::bad_alloc&) {
-      }
-      met = failure.met();
-    }
-    expectSame(detect(last.step, last.options, history).clearances, expected, "allocation " + std::to_string(n));
-  }
-  EXPECT_GT(n, 10);
+    const bool met = failsAt(n, false, [&] { detect(failing.step, failing.options, history); });
+    expectSame(detect(last.step, last.options, history).clearances, expected, "later");
+    return met;
+  });
+  EXPECT_GE(allocations, 10);
 }
 
 TEST(Clearance, IsTheSameAfterAllocationsThatFailed) {
@@ -420,14 +386,9 @@ TEST(Clearance, IsTheSameAfterAllocationsThatFailed) {
 /// A sheet that bends a little more in each step until its ends meet, and opens again: what is known of the steps
 /// before changes no answer.
 TEST(Clearance, OfABodyAndItselfIsTheSameWithoutTheStepsBefore) {
-  Positions flat;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 41; ++k) flat.emplace_back(k * 0.05, i * 0.05, 0);
-  }
-  ReferenceFrame reference;
-  reference.positions = flat;
+  const Positions flat = gridAt(3, 41, 0.05);
   Body cloth = bodyOf("cloth", Topology::grid(3, 41));
-  cloth.reference = share(reference);
+  cloth.reference = share(ReferenceFrame{flat, {}});
   const auto bent = [&](double angle) {  // about the strip's middle, with the sheet's own length
     Positions positions;
     for (const Vec3& p : flat) {
@@ -456,9 +417,7 @@ TEST(Clearance, IsStillBoundedWhereTheTimeRanOut) {
   const std::vector<Clearance> whole = distance(step, asking());
   int cut = 0, done = 0;
   for (int looks = 0; looks < 4000; looks = looks * 5 / 4 + 1) {
-    std::atomic<std::int64_t> left{looks};
-    History history;
-    const Outcome outcome = detect(step, asking(), history, Deadline::afterLooks(left));
+    const Outcome outcome = runFor(looks, step, asking());
     ASSERT_EQ(outcome.clearances.size(), whole.size());
     for (std::size_t i = 0; i < whole.size(); ++i) {
       for (const auto member : {&Clearance::at_end, &Clearance::over_step}) {
@@ -478,11 +437,9 @@ TEST(Clearance, OfManyBodiesOnlyTheFirstThatIsFarHasARow) {
   Options options = asking(0.9);
   options.rigid_tolerance_m = 1e-3;
   options.expected.push_back({{ExpectedPartner{3, {}, ""}, ExpectedPartner{40, {}, ""}}, ""});
-  History history;
-  const Outcome outcome = detect(step, options, history);
+  const Outcome outcome = Detector(options).run(step);
   ASSERT_GT(outcome.substeps, 1u);
-  const std::uint64_t pairs = outcome.stats[Effect::CLEARANCE].in;
-  EXPECT_EQ(pairs, 48u * 47 / 2 + 24 - 1) << "one that could meet itself is rigid";
+  EXPECT_EQ(outcome.stats[Effect::CLEARANCE].in, 48u * 47 / 2 + 24 - 1) << "one that could meet itself is rigid";
   EXPECT_LT(outcome.clearances.size(), 250u);
   expectSame(distance(step, options), outcome.clearances, "distance()");
   // Each two for themselves.
@@ -525,9 +482,7 @@ TEST(Clearance, OfManyBodiesNoneIsSilentlyFarWhereTheTimeRanOut) {
   const std::vector<Clearance> whole = distance(step, options);
   bool cut = false;
   for (int looks = 0; looks < 4000; looks = looks * 2 + 1) {
-    std::atomic<std::int64_t> left{looks};
-    History history;
-    const Outcome outcome = detect(step, options, history, Deadline::afterLooks(left));
+    const Outcome outcome = runFor(looks, step, options);
     for (const Clearance& row : whole) {
       if (row.over_step.status == ClearanceStatus::FARTHER) continue;
       const Clearance& some = rowOf(outcome.clearances, row.body[0], row.body[1]);
@@ -539,22 +494,18 @@ TEST(Clearance, OfManyBodiesNoneIsSilentlyFarWhereTheTimeRanOut) {
 }
 
 TEST(Clearance, RefusesNumbersThatMeanNothing) {
-  const auto said = [](double ClearanceOptions::*field, double value) -> std::string {
+  const auto refusal = [](double ClearanceOptions::*field, double value) {
     Options options = asking();
     options.clearance.*field = value;
-    try {
-      check(options);
-    } catch (const std::invalid_argument& e) {
-      return e.what();
-    }
-    return "nothing";
+    return said<std::invalid_argument>([&] { check(options); }, "nothing");
   };
-  EXPECT_EQ(said(&ClearanceOptions::max_m, 0), "clearance.max_m = 0.000000 is out of range; above 0, to 1e9");
-  EXPECT_EQ(said(&ClearanceOptions::self_m, std::nan("")), "clearance.self_m = nan is out of range; 0 (none) to 1e9");
-  EXPECT_EQ(said(&ClearanceOptions::self_m, 0), "nothing");
-  EXPECT_NE(said(&ClearanceOptions::tolerance_m, -1), "nothing");
-  EXPECT_NE(said(&ClearanceOptions::tolerance_m, INFINITY), "nothing");
-  EXPECT_EQ(said(&ClearanceOptions::max_m, 0.5), "nothing");
+  EXPECT_EQ(refusal(&ClearanceOptions::max_m, 0), "clearance.max_m = 0.000000 is out of range; above 0, to 1e9");
+  EXPECT_EQ(refusal(&ClearanceOptions::self_m, std::nan("")),
+            "clearance.self_m = nan is out of range; 0 (none) to 1e9");
+  EXPECT_EQ(refusal(&ClearanceOptions::self_m, 0), "nothing");
+  EXPECT_NE(refusal(&ClearanceOptions::tolerance_m, -1), "nothing");
+  EXPECT_NE(refusal(&ClearanceOptions::tolerance_m, INFINITY), "nothing");
+  EXPECT_EQ(refusal(&ClearanceOptions::max_m, 0.5), "nothing");
 }
 
 }  // namespace

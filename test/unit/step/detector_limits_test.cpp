@@ -3,32 +3,15 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
-#include "dccd/detect.h"
 #include "dccd/simd_target.h"
-#include "support/step_support.h"
+#include "support/looks.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
 namespace {
-
-constexpr std::int64_t MANY = std::int64_t{1} << 40;
-
-/// A first step that a deadline ends at this look at the clock, not at a time.
-Outcome runFor(std::int64_t looks, const Step& step, const Options& options = {}) {
-  std::atomic<std::int64_t> left{looks};
-  History history;
-  return detect(step, options, history, Deadline::afterLooks(left));
-}
-
-std::int64_t looksOf(const Step& step, const Options& options = {}) {
-  std::atomic<std::int64_t> left{MANY};
-  History history;
-  detect(step, options, history, Deadline::afterLooks(left));
-  return MANY - left;
-}
 
 /// Of an answer with all contacts, those in the cell that ends first.
 std::vector<Contact> firstCell(const std::vector<Contact>& contacts) {
@@ -93,8 +76,7 @@ TEST(DetectorLimits, EarliestOnlyEndsTheStepAtTheFirstContact) {
 TEST(DetectorLimits, EarliestOnlyNeverSaysThatNothingNewTouchesBesideWhatRests) {
   TestStep step = crossing();
   StepBody resting = step.bodies[1];
-  for (Vec3& x : resting.t0) x += Vec3(-1, 0, -1);
-  resting.t1 = resting.t0;
+  resting.t0 = resting.t1 = movedBy(resting.t0, {-1, 0, -1});
   step.bodies.push_back(resting);
   Options options;
   const Outcome whole = runOnce(step, options);
@@ -127,8 +109,7 @@ TEST(DetectorLimits, EarliestOnlyLeavesNothingForTheNextStep) {
     const Outcome after = detect(step.motion(), whole, history);
     EXPECT_EQ(difference(after.contacts, expected.contacts), "");
     EXPECT_EQ(after.start_state, expected.start_state);
-    EXPECT_TRUE(std::equal(after.intersections.begin(), after.intersections.end(), expected.intersections.begin(),
-                           expected.intersections.end(), [](const auto& x, const auto& y) { return x == y; }));
+    EXPECT_TRUE(same(after.intersections, expected.intersections));
   }
 }
 
@@ -159,9 +140,7 @@ TEST(DetectorLimits, EarliestOnlyUnderABudgetKeepsItsWord) {
 TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
   TestStep step = crossing();      // body 1 meets body 0 at 0.5, in a narrow bracket
   StepBody near = step.bodies[0];  // all the while as far from body 0 as the separation: the bracket is [0, 1]
-  for (Positions* x : {&near.t0, &near.t1}) {
-    for (Vec3& p : *x) p.z() -= 0.05;
-  }
+  moveBy(near, {0, 0, -0.05});
   step.bodies.push_back(near);
   Options options;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
@@ -291,8 +270,7 @@ TEST(DetectorLimits, AStartStateThatTheBudgetCutsIsKnownLater) {
   bool known = false;
   std::size_t cut = 0;
   for (std::size_t i = 0; !known && i < 200; ++i) {
-    std::atomic<std::int64_t> left{looks};
-    const Outcome part = detect(motions[i % 2], options, history, Deadline::afterLooks(left));
+    const Outcome part = runFor(looks, motions[i % 2], options, history);
     ASSERT_TRUE(part.allPairs());
     EXPECT_EQ(difference(part.contacts, full[i % 2].contacts), "");
     EXPECT_LE(part.intersections.size(), full[i % 2].intersections.size());
@@ -338,15 +316,7 @@ TEST(DetectorLimits, NothingIsCarriedOverAStepThatThrew) {
 // The map's part of a step is cut like the rest: what is listed is true, and of what is not nothing is said.
 TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
   constexpr std::size_t SIZE = 40;
-  std::vector<OccupiedLeaf> leaves;
-  for (std::uint16_t x = 0; x < SIZE; ++x) {
-    for (std::uint16_t y = 0; y < SIZE; ++y) {
-      leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32768}, 1});
-    }
-  }
-  Body cloth;
-  cloth.name = "cloth";
-  cloth.topology = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
+  Body cloth = bodyOf("cloth", Topology::grid(SIZE, SIZE));
   cloth.self_collision = false;
   Positions above, below;
   for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
@@ -355,7 +325,7 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
     below.emplace_back(0.9 * x + 0.5, 0.9 * y + 0.3, 0.8 - wave);
   }
   Step step = stepOf(cloth, above, below);
-  step.map.surface = VoxelSurface::build(1.0, leaves);
+  step.map.surface = VoxelSurface::build(1.0, voxelsOfBox({0, 0, 0}, {SIZE, SIZE, 1}));
   const Outcome full = runFor(MANY, step);
   EXPECT_TRUE(full.complete);
   ASSERT_GT(full.contacts.size(), 1000u);

@@ -10,7 +10,7 @@
 
 #include "support/heap.h"
 #include "support/said.h"
-#include "support/step_support.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -21,10 +21,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 std::string differenceOfResults(const Outcome& x, const Outcome& y) {
   std::string text = difference(x.contacts, y.contacts);
   if (x.start_state != y.start_state) text += " start states differ";
-  if (!std::equal(x.intersections.begin(), x.intersections.end(), y.intersections.begin(), y.intersections.end(),
-                  [](const auto& p, const auto& q) { return p == q; })) {
-    text += " intersections differ";
-  }
+  if (!same(x.intersections, y.intersections)) text += " intersections differ";
   return text;
 }
 
@@ -58,9 +55,7 @@ TEST(Detector, ManyBodies) {
   for (int b = 0; b < 300; ++b) {
     TestStep two = crossing();
     for (StepBody& body : two.bodies) {
-      for (Positions* x : {&body.t0, &body.t1}) {
-        for (Vec3& p : *x) p += Vec3(10.0 * (b % 20), 10.0 * (b / 20), 0);
-      }
+      moveBy(body, Vec3(10.0 * (b % 20), 10.0 * (b / 20), 0));
       step.bodies.push_back(body);
     }
   }
@@ -77,10 +72,7 @@ TEST(Detector, BodiesThatAreNamedAreNotTestedAgainstEachOther) {
   TestStep step = crumpled(5, 3, 8);
   for (StepBody& body : step.bodies) body.self_collision = false;
   Step motion = step.motion();
-  const auto answer = [](const Step& to_do) {
-    History history;
-    return detect(to_do, {}, history);
-  };
+  const auto answer = [](const Step& to_do) { return Detector().run(to_do); };
   const Outcome all = answer(motion);
   for (const auto& [namer, named] : {std::pair<std::size_t, std::uint16_t>{0, 2}, {2, 0}}) {
     motion = step.motion();
@@ -124,9 +116,7 @@ TEST(Detector, NothingIsLostOfBodiesThatAreFarFromAllOthers) {
       for (const StepBody& body : step.bodies) {
         next.push_back(body.t1);
         const Vec3 move(draw(-3, 3), draw(0, 3) == 0 ? 0.25 : 0, 0);
-        if (draw(0, 2) > 0) {
-          for (Vec3& p : next.back()) p += move;
-        }
+        if (draw(0, 2) > 0) next.back() = movedBy(body.t1, move);
       }
       step = step.continued(next);
     }
@@ -229,10 +219,7 @@ TEST(Detector, ContactsWithAMapAreInOrder) {
   TestStep step = crossing();
   for (StepBody& body : step.bodies) body.against_bodies = false;
   Step motion = step.motion();
-  std::vector<OccupiedLeaf> leaves;
-  for (std::uint16_t x = 0; x < 4; ++x)
-    leaves.push_back({VoxelKey{static_cast<std::uint16_t>(32768 + x), 32768, 32768}, 1});
-  motion.map.surface = VoxelSurface::build(1.0, leaves);
+  motion.map.surface = VoxelSurface::build(1.0, voxelsOfBox({0, 0, 0}, {4, 1, 1}));
   const Outcome result = Detector().run(motion);
   std::set<std::uint16_t> bodies;
   std::set<PairKind> kinds;

@@ -31,6 +31,30 @@ std::string reason(const EffectPlan& plan, const std::string& name) {
   return "";
 }
 
+std::string saidOf(const EffectScene& scene, const std::string& name) { return reason(EffectPlan(scene, {}), name); }
+
+/// By itself.
+void expectRuns(const EffectScene& scene, Effect effect, const std::string& why) {
+  EXPECT_TRUE(EffectPlan(scene, {}).running(effect)) << why;
+  EXPECT_EQ(saidOf(scene, toString(effect)), why);
+}
+
+/// Runs neither by itself nor because the user asks for it, which is no mistake either.
+void expectIdle(const EffectScene& scene, Effect effect, const std::string& why) {
+  for (const EffectSetting setting : {EffectSetting::AUTO, EffectSetting::ON}) {
+    const EffectPlan plan(scene, {{effect, setting}});
+    EXPECT_FALSE(plan.running(effect)) << toString(setting);
+    EXPECT_EQ(reason(plan, toString(effect)), why) << toString(setting);
+  }
+}
+
+/// To ask for it is a mistake.
+void expectRefused(const EffectScene& scene, Effect effect, const std::string& why) {
+  EXPECT_FALSE(EffectPlan(scene, {}).running(effect)) << why;
+  EXPECT_EQ(saidOf(scene, toString(effect)), why);
+  EXPECT_THROW(EffectPlan(scene, {{effect, EffectSetting::ON}}), std::invalid_argument) << why;
+}
+
 TEST(EffectPlan, AutoTakesWhatTheSceneCallsFor) {
   const EffectPlan plan(cloth(), {});
   EXPECT_TRUE(plan.running(Effect::SELF_COLLISION));
@@ -61,73 +85,59 @@ TEST(EffectPlan, AMapThatIsNamedIsWantedBeforeItComes) {
   EffectScene scene = cloth();
   scene.map_source = "/table";
   scene.map_named = true;
-  const EffectPlan before(scene, {});
-  EXPECT_TRUE(before.running(Effect::OCTOMAP));
-  EXPECT_EQ(reason(before, "octomap"), "octomap_topic names /table, from which no map has come");
+  expectRuns(scene, Effect::OCTOMAP, "octomap_topic names /table, from which no map has come");
   scene.map_seen = true;
-  EXPECT_EQ(reason(EffectPlan(scene, {}), "octomap"), "the map comes from /table");
+  expectRuns(scene, Effect::OCTOMAP, "the map comes from /table");
   scene.bodies[0].against_obstacle = false;
   EXPECT_FALSE(EffectPlan(scene, {}).running(Effect::OCTOMAP)) << "nobody could meet it";
 }
 
 // Whatever the user asks for: there is nothing to look at, to know, or nobody to tell.
 TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
-  const auto on = [](const EffectScene& scene, Effect effect) {
-    return EffectPlan(scene, {{effect, EffectSetting::ON}});
-  };
   EffectScene rope = cloth();
   rope.bodies[0].topology = share(Topology::polyline(3));
-  EXPECT_FALSE(EffectPlan(rope, {}).running(Effect::START_STATE));
-  EXPECT_FALSE(on(rope, Effect::START_STATE).running(Effect::START_STATE));
-  EXPECT_EQ(reason(on(rope, Effect::START_STATE), "start_state"),
-            "edges alone cannot be inside of anything, and there is no map");
-  rope.map_named = rope.map_seen = true;
-  EXPECT_FALSE(on(rope, Effect::START_STATE).running(Effect::START_STATE)) << "no map has come yet";
+  for (const bool seen : {false, true}) {  // which is not yet in use
+    rope.map_named = rope.map_seen = seen;
+    expectIdle(rope, Effect::START_STATE, "edges alone cannot be inside of anything, and there is no map");
+  }
   rope.map_used = true;
   EXPECT_TRUE(EffectPlan(rope, {}).running(Effect::START_STATE)) << "a rope may begin inside of the map";
 
   EffectScene unknown = cloth();
   unknown.unknown_space_counts = true;
-  EXPECT_FALSE(EffectPlan(unknown, {}).running(Effect::UNKNOWN_SPACE));
-  EXPECT_EQ(reason(on(unknown, Effect::UNKNOWN_SPACE), "unknown_space"),
-            "unknown_space is not free, but there is no map that could know it");
-  EXPECT_FALSE(on(unknown, Effect::UNKNOWN_SPACE).running(Effect::UNKNOWN_SPACE));
+  const char* const no_map = "unknown_space is not free, but there is no map that could know it";
+  expectIdle(unknown, Effect::UNKNOWN_SPACE, no_map);
   unknown.map_used = true;
   EXPECT_TRUE(EffectPlan(unknown, {}).running(Effect::UNKNOWN_SPACE));
   unknown.bodies[0].against_obstacle = false;
-  EXPECT_FALSE(on(unknown, Effect::UNKNOWN_SPACE).running(Effect::UNKNOWN_SPACE));
+  EXPECT_FALSE(EffectPlan(unknown, {{Effect::UNKNOWN_SPACE, EffectSetting::ON}}).running(Effect::UNKNOWN_SPACE));
 
   EffectScene first = cloth();
   EXPECT_TRUE(EffectPlan(first, {}).running(Effect::PATCHES));
   first.earliest_only = true;
-  EXPECT_FALSE(EffectPlan(first, {}).running(Effect::PATCHES));
-  EXPECT_EQ(reason(EffectPlan(first, {}), "patches"), "earliest_only is true, and patches are made of all contacts");
-  EXPECT_THROW(on(first, Effect::PATCHES), std::invalid_argument);
+  expectRefused(first, Effect::PATCHES, "earliest_only is true, and patches are made of all contacts");
 
   EffectScene seen = cloth();
-  EXPECT_EQ(reason(EffectPlan(seen, {}), "own_voxels"), "own_voxels_m is 0 for every body; set it above");
-  EXPECT_THROW(on(seen, Effect::OWN_VOXELS), std::invalid_argument);
+  expectRefused(seen, Effect::OWN_VOXELS, "own_voxels_m is 0 for every body; set it above");
   seen.bodies[0].own_voxels_m = 0.02;
-  EXPECT_EQ(reason(on(seen, Effect::OWN_VOXELS), "own_voxels"), "there is no map");
+  expectIdle(seen, Effect::OWN_VOXELS, "there is no map");
   seen.map_used = true;
-  EXPECT_EQ(reason(EffectPlan(seen, {}), "own_voxels"),
-            "what the map first shows where a body is, is no obstacle: cloth within 0.02 m");
-  EXPECT_TRUE(EffectPlan(seen, {}).running(Effect::OWN_VOXELS));
+  const std::string told = "what the map first shows where a body is, is no obstacle: ";
+  expectRuns(seen, Effect::OWN_VOXELS, told + "cloth within 0.02 m");
   seen.bodies[0].own_voxels_m = ONE_VOXEL;
-  EXPECT_NE(reason(EffectPlan(seen, {}), "own_voxels").find("cloth within a voxel"), std::string::npos);
+  expectRuns(seen, Effect::OWN_VOXELS, told + "cloth within a voxel");
 
   EffectScene ahead = cloth();
   ahead.look_ahead_s = 0.5;
-  EXPECT_FALSE(on(ahead, Effect::LOOK_AHEAD).running(Effect::LOOK_AHEAD));
-  EXPECT_EQ(reason(EffectPlan(ahead, {}), "look_ahead"), "nobody subscribes to predictions");
+  expectIdle(ahead, Effect::LOOK_AHEAD, "nobody subscribes to predictions");
   ahead.predictions_heard = true;
-  EXPECT_EQ(reason(EffectPlan(ahead, {}), "look_ahead"), "predictions reach 0.5 s ahead");
-  EXPECT_TRUE(EffectPlan(ahead, {}).running(Effect::LOOK_AHEAD));
+  expectRuns(ahead, Effect::LOOK_AHEAD, "predictions reach 0.5 s ahead");
 
   EffectScene apart = cloth();
   EXPECT_FALSE(EffectPlan(apart, {}).running(Effect::CLEARANCE));
-  EXPECT_EQ(reason(EffectPlan(apart, {}), "clearance"), "nobody asks for distances");
-  EXPECT_TRUE(on(apart, Effect::CLEARANCE).running(Effect::CLEARANCE)) << "for whoever reads ~state alone";
+  EXPECT_EQ(saidOf(apart, "clearance"), "nobody asks for distances");
+  EXPECT_TRUE(EffectPlan(apart, {{Effect::CLEARANCE, EffectSetting::ON}}).running(Effect::CLEARANCE))
+      << "for whoever reads ~state alone";
   apart.clearance_wanted = true;
   EXPECT_TRUE(EffectPlan(apart, {}).running(Effect::CLEARANCE));
   EXPECT_FALSE(EffectPlan(apart, {{Effect::CLEARANCE, EffectSetting::OFF}}).running(Effect::CLEARANCE));
@@ -217,17 +227,6 @@ TEST(EffectPlan, ABodyWithABorderHasNoInside) {
 }
 
 // --- what pairs carry ------------------------------------------------------------------------------------------------
-
-std::string saidOf(const EffectScene& scene, const std::string& name) { return reason(EffectPlan(scene, {}), name); }
-
-/// Runs neither by itself nor because the user asks for it, which is no mistake either.
-void expectIdle(const EffectScene& scene, Effect effect, const std::string& why) {
-  for (const EffectSetting setting : {EffectSetting::AUTO, EffectSetting::ON}) {
-    const EffectPlan plan(scene, {{effect, setting}});
-    EXPECT_FALSE(plan.running(effect)) << toString(setting);
-    EXPECT_EQ(reason(plan, toString(effect)), why) << toString(setting);
-  }
-}
 
 const char* const ONLY_THE_MAP_WOULD = "only pairs with the map carry a separation, but there is no map";
 const char* const NO_PAIR_CARRIES = "a separation is set, but no pair that is tested carries it";

@@ -6,9 +6,8 @@
 #include <set>
 
 #include "dccd/assurance.h"
-#include "support/detector.h"
 #include "support/said.h"
-#include "support/step_support.h"
+#include "unit/step/two_sheets.h"
 
 namespace dccd {
 namespace test {
@@ -16,32 +15,12 @@ namespace {
 
 constexpr std::uint16_t UPPER = 0, LOWER = 1;
 
-Positions sheetAt(double z) {
-  Positions points;
-  for (int i = 0; i < 16; ++i) points.push_back({0.1 * (i % 4), 0.1 * (i / 4), z + 0.001 * ((7 * i) % 5)});
-  return points;
-}
-
 /// A sheet that falls through another one.
-struct Falling {
-  Step step;
-  Options options;
-
-  explicit Falling(double from = 0.3, double to = -0.3) {
-    Body upper, lower;
-    upper.name = "upper";
-    lower.name = "lower";
-    upper.topology = lower.topology = std::make_shared<const Topology>(Topology::grid(4, 4));
-    step.bodies = {moving(upper, sheetAt(from), sheetAt(to)), moving(lower, sheetAt(0), sheetAt(0))};
-    step.stamp_ns = 100000000;
-  }
+struct Falling : TwoSheets {
+  explicit Falling(double from = 0.3, double to = -0.3) : TwoSheets(from, to) {}
   Falling& expect(const ExpectedPartner& a, const ExpectedPartner& b, const std::string& phase = "") {
     options.expected.push_back({{a, b}, phase});
     return *this;
-  }
-  Outcome answer() const {
-    History history;
-    return detect(step, options, history);
   }
 };
 
@@ -213,8 +192,7 @@ TEST(ExpectedContacts, ABodyInsideOfAnotherIsExpectedWithoutSetsOnly) {
   const Positions big{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {0, 0, 4}};
   Positions small = big;
   for (Vec3& x : small) x = 0.1 * x + Vec3(0.5, 0.5, 0.5);
-  const auto solid =
-      std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}));
+  const auto solid = share(Topology::fromTriangles(4, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}));
   for (Body& body : falling.step.bodies) body.topology = solid;
   falling.step.bodies[UPPER] = moving(falling.step.bodies[UPPER], small, small);
   falling.step.bodies[LOWER] = moving(falling.step.bodies[LOWER], big, big);
@@ -228,7 +206,7 @@ TEST(ExpectedContacts, ABodyInsideOfAnotherIsExpectedWithoutSetsOnly) {
 TEST(ExpectedContacts, TheMapIsAPartnerAndItsSuppressedContactsKeepTheirMark) {
   Falling falling(0.3, -0.3);
   falling.step.bodies.resize(1);
-  falling.step.map.surface = VoxelSurface::build(0.1, {{{32768, 32768, 32768}, 1}});
+  falling.step.map.surface = VoxelSurface::build(0.1, {voxelAt(0, 0, 0)});
   ASSERT_EQ(falling.answer().touching, Touching::NEW);
   const Outcome outcome = Falling(falling).expect(all(UPPER), all(OBSTACLE_BODY)).answer();
   EXPECT_EQ(outcome.touching, Touching::EXPECTED);
@@ -276,7 +254,7 @@ TEST(ExpectedContacts, ChangeFromStepToStep) {
   falling.options.expected = {{{only(UPPER, {3}), all(LOWER)}, ""}};
   detector.setOptions(falling.options);
   EXPECT_EQ(detector.run(falling.step).touching, Touching::NEW);
-  falling.step.bodies[UPPER].topology = std::make_shared<const Topology>(Topology::grid(2, 8));
+  falling.step.bodies[UPPER].topology = share(Topology::grid(2, 8));
   EXPECT_EQ(detector.run(falling.step).touching, Touching::NEW);
 }
 

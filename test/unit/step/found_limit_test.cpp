@@ -7,10 +7,9 @@
 
 #include <algorithm>
 
-#include "dccd/detect.h"
 #include "support/checkerboard.h"
 #include "support/heap.h"
-#include "support/step_support.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -20,15 +19,8 @@ constexpr std::size_t MIB = std::size_t{1} << 20;
 
 /// A tracked cloth, all of it in one place at the times that are named.
 Step collapsed(std::size_t size, bool at_start, bool at_end, const Vec3& at = Vec3(0.1, 0.2, 0.3)) {
-  Positions flat;
-  for (std::size_t i = 0; i < size * size; ++i) {
-    flat.emplace_back(0.01 * static_cast<double>(i % size), 0.012 * static_cast<double>(i / size), 0.0);
-  }
-  const Positions point(size * size, at);
-  Body cloth;
-  cloth.name = "cloth";
-  cloth.topology = std::make_shared<const Topology>(Topology::grid(size, size));
-  return stepOf(cloth, at_start ? point : flat, at_end ? point : flat);
+  const Positions flat = gridAt(size, size, 0.01), point(size * size, at);
+  return stepOf(bodyOf("cloth", Topology::grid(size, size)), at_start ? point : flat, at_end ? point : flat);
 }
 
 std::size_t features(const Topology& topology) {
@@ -65,9 +57,15 @@ void expectSameAnswer(const Outcome& x, const Outcome& y) {
   EXPECT_EQ(x.reason, y.reason);
   EXPECT_EQ(x.start_state, y.start_state);
   EXPECT_EQ(x.start_state_complete, y.start_state_complete);
-  EXPECT_EQ(x.intersections.size(), y.intersections.size());
-  EXPECT_TRUE(std::equal(x.intersections.begin(), x.intersections.end(), y.intersections.begin(), y.intersections.end(),
-                         [](const auto& a, const auto& b) { return a == b; }));
+  EXPECT_TRUE(same(x.intersections, y.intersections));
+}
+
+/// What is listed of a step that was cut is listed of all of it, bit for bit.
+void expectAmong(const Outcome& full, const Outcome& cut) {
+  for (const Contact& c : cut.contacts) {
+    const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
+    ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
+  }
 }
 
 // 900 vertices: 4.8 million pairs.
@@ -98,11 +96,7 @@ TEST(FoundLimit, WhateverCoincidesDoesNotCostTheSquare) {
   Step twins = collapsed(40, false, false);
   twins.bodies.push_back(twins.bodies[0]);
   twins.bodies[1].name = "twin";
-  for (Body& body : twins.bodies) {
-    Positions moved = *body.t0;
-    for (Vec3& x : moved) x += Vec3(0.001, 0.002, 0.003);
-    body.t1 = share(moved);
-  }
+  for (Body& body : twins.bodies) body.t1 = share(movedBy(*body.t0, {0.001, 0.002, 0.003}));
   steps.push_back(twins);
   for (std::size_t i = 0; i < steps.size(); ++i) {
     std::size_t limit = 0;
@@ -152,10 +146,7 @@ TEST(FoundLimit, TheCutIsTheSameForEveryThreadAndTarget) {
       if (same != cut.contacts.end() && difference({*same}, {truth}).empty()) continue;
       EXPECT_LE(cut.unchecked_toc_lower, truth.toc_upper) << describe(truth);
     }
-    for (const Contact& c : cut.contacts) {
-      const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
-      ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
-    }
+    expectAmong(full, cut);
     for (const int threads : {2, 3, 4}) {
       options.num_threads = threads;
       expectSameAnswer(runOnce(step, options), cut);
@@ -206,10 +197,7 @@ TEST(FoundLimit, TheMapIsCutAsWell) {
   expectCut(cut, 1000);
   EXPECT_EQ(cut.contacts.size(), 1000u);
   EXPECT_EQ(cut.unchecked_toc_lower, 0);
-  for (const Contact& c : cut.contacts) {
-    const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
-    ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
-  }
+  expectAmong(full, cut);
   options.max_found = full.contacts.size();
   EXPECT_FALSE(Detector(options).run(step).cut);
   // What a step found is not counted in the next one.
@@ -222,9 +210,7 @@ TEST(FoundLimit, TheMapIsCutAsWell) {
 // A first contact is looked for in two searches: what the first one found counts once, before the map's turn, too.
 TEST(FoundLimit, ALimitThatIsNotReachedLeavesTheMapItsShare) {
   Step step = crumpled(3, 2, 40).motion();
-  std::vector<OccupiedLeaf> leaves;
-  for (std::uint16_t i = 0; i < 40; ++i) leaves.push_back({{static_cast<std::uint16_t>(32768 + i), 32768, 32768}, 1});
-  step.map.surface = VoxelSurface::build(1.0, leaves);
+  step.map.surface = VoxelSurface::build(1.0, voxelsOfBox({0, 0, 0}, {40, 1, 1}));
   Options options;
   options.earliest_only = true;
   const Outcome full = runOnceWith(options, step);

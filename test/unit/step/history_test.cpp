@@ -10,6 +10,7 @@
 #include "step/history.h"
 #include "stream/monitor_impl.h"
 #include "support/closed_meshes.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -36,8 +37,7 @@ void expectSameAnswer(const Outcome& a, const Outcome& b) {
   EXPECT_EQ(a.status, b.status);
   EXPECT_EQ(difference(a.contacts, b.contacts), "");
   EXPECT_EQ(a.start_state, b.start_state);
-  EXPECT_TRUE(std::equal(a.intersections.begin(), a.intersections.end(), b.intersections.begin(), b.intersections.end(),
-                         [](const auto& x, const auto& y) { return x == y; }));
+  EXPECT_TRUE(same(a.intersections, b.intersections));
 }
 
 /// Everything about an answer but its times.
@@ -55,7 +55,7 @@ void expectSame(const Outcome& a, const Outcome& b) {
 TestStep clothsInABox() {
   TestStep step = crumpled(3, 2, 9);
   step.bodies.push_back(box(Vec3::Constant(-50), Vec3::Constant(50)));
-  for (Vec3& p : step.bodies[2].t1) p[0] += 1;  // bounds of what rests are wider, and let more through
+  step.bodies[2].t1 = movedBy(step.bodies[2].t0, {1, 0, 0});  // bounds of what rests are wider, and let more through
   return step;
 }
 
@@ -109,7 +109,7 @@ TEST(History, AMapThatIsGoneIsNotKeptByOtherOptions) {
     for (Vec3& p : *x) p *= 0.1;
   }
   Step with_map = step.motion();
-  with_map.map = {VoxelSurface::build(0.05, {{{32768, 32768, 32768}, 4}}), 1, Eigen::Isometry3d::Identity(), {}};
+  with_map.map = {VoxelSurface::build(0.05, {voxelAt(0, 0, 0, 4)}), 1, Eigen::Isometry3d::Identity(), {}};
   Options expecting, other;
   expecting.obstacle_expected = other.obstacle_expected = true;
   other.max_contacts = 5000;
@@ -258,8 +258,7 @@ TEST(History, AStepAsideBeginsWhereItIsToldOnce) {
   // Apart from all others: what the other history knows of the start would be wrong of it.
   TestStep apart = next;
   apart.bodies.pop_back();
-  for (Vec3& p : apart.bodies[1].t0) p += Vec3::Constant(100);
-  apart.bodies[1].t1 = apart.bodies[1].t0;
+  apart.bodies[1].t0 = apart.bodies[1].t1 = movedBy(apart.bodies[1].t0, Vec3::Constant(100));
   const Outcome alone = runOnce(apart, {});
   const std::vector<std::pair<const char*, std::function<void(History&)>>> ends = {
       {"it is answered", [&](History& aside) { detect(next.motion(), {}, aside); }},

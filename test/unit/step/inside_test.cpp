@@ -5,12 +5,12 @@
 
 #include <cmath>
 #include <limits>
-#include <new>
 
 #include "dccd/stream.h"
 #include "support/closed_meshes.h"
+#include "support/shapes.h"
 #include "support/step_truth.h"
-#include "unit/allocations.h"
+#include "unit/failing_allocations.h"
 
 namespace dccd {
 namespace test {
@@ -20,10 +20,6 @@ const double NAN_M = std::numeric_limits<double>::quiet_NaN();
 
 StartIntersection insideOf(std::uint16_t body, Index vertex, std::uint16_t closed) {
   return {{body, closed}, {vertex, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX}};
-}
-
-bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
-  return std::equal(x.begin(), x.end(), y.begin(), y.end(), [](const auto& a, const auto& b) { return a == b; });
 }
 
 StepBody clothAt(const Vec3& corner) { return sheet(4, 5, corner, 0.1); }
@@ -49,9 +45,7 @@ TEST(Inside, AClothInAClosedBodyIsNoClearStart) {
 
 TEST(Inside, ABodyThatIsOutsideOrNotAskedForIsClear) {
   TestStep beside = clothInABox();
-  for (Positions* x : {&beside.bodies[0].t0, &beside.bodies[0].t1}) {
-    for (Vec3& p : *x) p[0] += 5;
-  }
+  moveBy(beside.bodies[0], {5, 0, 0});
   EXPECT_EQ(startOf(beside).start_state, StartState::CLEAR);
   TestStep unasked = clothInABox();
   unasked.bodies[0].against_bodies = false;
@@ -108,33 +102,23 @@ TEST(Inside, OneBoxHasOneAnswerHoweverItsCornersAreNumbered) {
   two.self_collision = false;
   layers.bodies[1] = two;
   EXPECT_TRUE(same(startOf(layers).intersections, {insideOf(0, 0, 1)}));
-  for (Positions* x : {&layers.bodies[0].t0, &layers.bodies[0].t1}) {
-    for (Vec3& p : *x) p[2] -= 3;
-  }
+  moveBy(layers.bodies[0], {0, 0, -3});
   EXPECT_EQ(startOf(layers).start_state, StartState::CLEAR) << "under it, with all layers above";
 }
 
 /// `last`, after `before` and an attempt at it in which one allocation after the other fails, is answered as ever.
 void expectNothingHalfDone(const std::vector<Step>& before, const Step& last) {
-  History fresh;
-  const Outcome expected = detect(last, Options(), fresh);
-  int n = 0;
-  for (bool met = true; met && !testing::Test::HasFailure(); ++n) {
-    History history;
-    for (const Step& step : before) detect(step, Options(), history);
-    {
-      const AllocationFailure failure(n, false);
-      try {
-        detect(last, Options(), history);
-      } catch (const std::bad_alloc&) {
-      }
-      met = failure.met();
-    }
-    const Outcome outcome = detect(last, Options(), history);
-    EXPECT_TRUE(same(outcome.intersections, expected.intersections)) << "allocation " << n;
-    EXPECT_EQ(difference(outcome.contacts, expected.contacts), "") << "allocation " << n;
-  }
-  EXPECT_GT(n, 50);
+  const Outcome expected = Detector().run(last);
+  const int allocations = failingEverywhere([&](int n) {
+    Detector detector;
+    for (const Step& step : before) detector.run(step);
+    const bool met = failsAt(n, false, [&] { detector.run(last); });
+    const Outcome outcome = detector.run(last);
+    EXPECT_TRUE(same(outcome.intersections, expected.intersections));
+    EXPECT_EQ(difference(outcome.contacts, expected.contacts), "");
+    return met;
+  });
+  EXPECT_GE(allocations, 50);
 }
 
 TEST(Inside, IsFoundAfterAnAllocationThatFailedWhileSeamsWereSought) {
@@ -166,7 +150,7 @@ TEST(Inside, SeamsThatComeApartAreApartAfterAnAllocationThatFailedForAnotherBody
 TEST(Inside, WhatIsLeftOutIsThatOfTheStepAfterAnAllocationThatFailedWhileSeamsWereSought) {
   TestStep open;
   open.bodies = {withOwnCorners(box({-1, -1, -1}, {1, 1, 1})), clothAt({0.2, 0.1, 0})};
-  for (Vec3& p : open.bodies[1].t1) p[2] += 3;
+  open.bodies[1].t1 = movedBy(open.bodies[1].t0, {0, 0, 3});
   TestStep closed = open;
   open.bodies[0].t0[5][0] += 0.1;
   open.bodies[1].t0[0][0] = NAN_M;
@@ -272,8 +256,8 @@ TEST(Inside, WhatIsInsideStaysKnownWithoutAQuestion) {
   Detector detector;
   EXPECT_GT(detector.run(step.motion()).stats[Stage::START_STATE].in, 0u);
   for (int i = 0; i < 3; ++i) {
-    Positions moved = step.bodies[0].t1, turned = step.bodies[1].t1;
-    for (Vec3& p : moved) p += Vec3(0.05, 0.02, 0.1);
+    const Positions moved = movedBy(step.bodies[0].t1, {0.05, 0.02, 0.1});
+    Positions turned = step.bodies[1].t1;
     for (Vec3& p : turned) p = Eigen::AngleAxisd(0.1, Vec3::UnitX()) * p;
     step = step.continued({moved, turned});
     const Outcome outcome = detector.run(step.motion());
@@ -304,9 +288,7 @@ TEST(Inside, ABoxAtRestIsSewnOnceSomethingComesNear) {
   near.bodies[1] = withOwnCorners(near.bodies[1]);
   near.bodies[0].self_collision = false;
   TestStep far = near;
-  for (Positions* x : {&far.bodies[0].t0, &far.bodies[0].t1}) {
-    for (Vec3& p : *x) p[0] += 5;
-  }
+  moveBy(far.bodies[0], {5, 0, 0});
   Detector detector;
   for (const bool is_near : {false, false, true, true, false, true}) {
     Step step = (is_near ? near : far).motion();
@@ -321,8 +303,7 @@ TEST(Inside, ABoxAtRestIsSewnOnceSomethingComesNear) {
 // A prediction is told by the step that it begins at.
 TEST(Inside, APredictionKnowsItsStart) {
   TestStep step = clothInABox();
-  Positions outside = step.bodies[0].t0;
-  for (Vec3& p : outside) p[2] += 5;
+  const Positions outside = movedBy(step.bodies[0].t0, {0, 0, 5});
   History history, aside;
   for (const Positions& end : {step.bodies[0].t0, outside, outside, step.bodies[0].t0}) {
     step = step.continued({end, step.bodies[1].t0});

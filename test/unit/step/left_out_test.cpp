@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <set>
 #include <string>
@@ -13,7 +12,7 @@
 #include "dccd/stream.h"
 #include "oracle/exact_distance.h"
 #include "step/pairs/left_out.h"
-#include "support/step_support.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -22,22 +21,13 @@ namespace {
 constexpr double EDGE_M = 0.01, SEPARATION_M = 0.012;
 constexpr std::size_t SIZE = 6;
 
-Positions flat(double z = 0) {
-  Positions x;
-  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
-    x.emplace_back(EDGE_M * static_cast<double>(i % SIZE), EDGE_M * static_cast<double>(i / SIZE), z);
-  }
-  return x;
-}
-
 /// Two layers of one body, `gap` apart; the upper one is the second half of the vertices.
 struct Layers {
   std::shared_ptr<const Topology> topology;
   Positions at(double gap) const {
-    Positions x = flat(), upper = flat(gap);
+    Positions x = gridAt(SIZE, SIZE, EDGE_M);
     // A little aside, so that no vertex is above another one.
-    for (Vec3& p : upper) p += Vec3(0.003, 0.002, 0);
-    x.insert(x.end(), upper.begin(), upper.end());
+    for (const Vec3& p : gridAt(SIZE, SIZE, EDGE_M, {0.003, 0.002, gap})) x.push_back(p);
     return x;
   }
   Layers() {
@@ -48,7 +38,7 @@ struct Layers {
       for (Index& v : upper) v += static_cast<Index>(SIZE * SIZE);
       faces.push_back(upper);
     }
-    topology = std::make_shared<const Topology>(Topology::fromTriangles(2 * SIZE * SIZE, faces));
+    topology = share(Topology::fromTriangles(2 * SIZE * SIZE, faces));
   }
 };
 
@@ -59,11 +49,9 @@ Options conservative() {
 }
 
 Body felt(const Layers& layers, const Positions* reference) {
-  Body body;
-  body.name = "felt";
-  body.topology = layers.topology;
+  Body body = bodyOf("felt", *layers.topology);
   body.minimum_separation_m = SEPARATION_M;
-  if (reference) body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*reference, {}});
+  if (reference) body.reference = share(ReferenceFrame{*reference, {}});
   return body;
 }
 
@@ -164,15 +152,12 @@ TEST(LeftOut, LayersThatComeNearAreFoundAllTheSame) {
 
 // Left out of the separation only: that its features truly meet is found without one.
 TEST(LeftOut, TrueContactIsNotLost) {
-  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
   const Positions apart{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 0.1}, {0.25, 0.25, 1}, {0.5, 0.25, 1}};
   Positions through = apart;
   through[3].z() = -0.1;
-  Body body;
-  body.name = "pair";
-  body.topology = topology;
+  Body body = bodyOf("pair", Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
   body.minimum_separation_m = 0.2;
-  body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{apart, {}});
+  body.reference = share(ReferenceFrame{apart, {}});
   Felt detector(body, apart);
   EXPECT_GT(detector.leftOut().size(), 0u);
   EXPECT_TRUE(detector.run(apart, apart).contacts.empty());
@@ -200,12 +185,10 @@ TEST(LeftOut, SeparationsOfPairsReplaceTheBodies) {
     return detector.detector.run(step);
   };
   EXPECT_FALSE(both().contacts.empty()) << "5 m apart, 6 m asked for by the other body";
-  second.separations = {{7, 1.0}};
-  EXPECT_THROW(both(), std::invalid_argument);
-  second.separations = {{0, -1.0}};
-  EXPECT_THROW(both(), std::invalid_argument);
-  second.separations = {{0, std::numeric_limits<double>::quiet_NaN()}};
-  EXPECT_THROW(both(), std::invalid_argument);
+  for (const SeparationFrom& wrong : {SeparationFrom{7, 1.0}, {0, -1.0}, {0, std::nan("")}}) {
+    second.separations = {wrong};
+    EXPECT_THROW(both(), std::invalid_argument);
+  }
 }
 
 /// A monitor of one body of two layers, fed with frames 0.1 s apart.
@@ -272,7 +255,7 @@ TEST(LeftOut, AQuestionChangesNoReference) {
   felt.name = "felt";
   felt.minimum_separation_m = SEPARATION_M;
   other.name = "other";
-  const auto triangle = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  const auto triangle = share(Topology::fromTriangles(3, {{0, 1, 2}}));
   const Positions far{{5, 0, 0}, {6, 0, 0}, {5, 1, 0}};
   const auto contactsWith = [&](bool questions) {
     Monitor monitor(options, {felt, other});

@@ -3,48 +3,32 @@
 
 #include <atomic>
 
-#include "support/step_support.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
 struct OnAMap : testing::Test {
-  Topology topology = Topology::grid(12, 12);
-  Positions lying;
-  std::shared_ptr<const VoxelSurface> map;
+  const Positions lying = gridAt(12, 12, 0.1, {0.013, 0.017, 1});
+  const std::shared_ptr<const VoxelSurface> map = surface(0);
   Detector keeps;
   std::uint64_t kept = 0;
 
-  OnAMap() {
-    for (int i = 0; i < 144; ++i) lying.emplace_back(0.1 * (i % 12) + 0.013, 0.1 * (i / 12) + 0.017, 1.0);
-    map = surface(0);
-  }
-  static std::shared_ptr<const VoxelSurface> surface(std::uint16_t missing) {
-    std::vector<OccupiedLeaf> leaves;
-    for (std::uint16_t x = missing; x < 6; ++x) {
-      for (std::uint16_t y = 0; y < 6; ++y) {
-        OccupiedLeaf leaf;
-        leaf.min = {static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32771};
-        leaves.push_back(leaf);
-      }
-    }
+  static std::shared_ptr<const VoxelSurface> surface(int missing) {
+    std::vector<OccupiedLeaf> leaves = voxelsOfBox({missing, 0, 3}, {6, 6, 4});
     // A post beside the cloth, higher than it is lifted, so that the map's bounds reach it.
-    leaves.push_back({{32768 + 8, 32768 + 8, 32772}, 1});
+    leaves.push_back(voxelAt(8, 8, 4));
     return VoxelSurface::build(0.25, leaves);
   }
   /// The step's answer, which is that of a history of its own.
   Outcome run(const Positions& t0, const Positions& t1, const std::shared_ptr<const VoxelSurface>& on,
               double shift = 0) {
-    Body body;
-    body.name = "cloth";
-    body.topology = share(topology);
-    Step step = stepOf(body, t0, t1);
+    Step step = stepOf(bodyOf("cloth", Topology::grid(12, 12)), t0, t1);
     step.map.surface = on;
     step.map.map_from_fixed.translation() = Vec3(shift, 0, 0);
     const Outcome with = keeps.run(step);
-    Detector fresh;
-    const Outcome expected = fresh.run(step);
+    const Outcome expected = Detector().run(step);
     EXPECT_EQ(difference(with.contacts, expected.contacts), "");
     EXPECT_EQ(with.start_state, expected.start_state);
     EXPECT_EQ(with.intersections.size(), expected.intersections.size());
@@ -74,8 +58,7 @@ TEST_F(OnAMap, ItsContactsAreKeptWhileNothingChanges) {
 TEST_F(OnAMap, WhatMovesIsLookedAt) {
   for (int i = 0; i < 3; ++i) run(lying, lying, map);
   EXPECT_EQ(kept, 1u);
-  Positions lifted = lying;
-  for (Vec3& p : lifted) p.z() += 0.01;
+  const Positions lifted = movedBy(lying, {0, 0, 0.01});
   run(lying, lifted, map);
   EXPECT_EQ(kept, 0u);
   EXPECT_EQ(run(lifted, lifted, map).contacts.size(), 0u);

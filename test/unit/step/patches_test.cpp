@@ -10,7 +10,7 @@
 #include "dccd/contact_geometries.h"
 #include "oracle/oracle.h"
 #include "support/patch_oracle.h"
-#include "support/step_support.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -24,35 +24,11 @@ Options withPatches(int threads = 1) {
 }
 
 Body sheet(const std::string& name, std::size_t rows, std::size_t cols) {
-  Body body;
-  body.name = name;
-  body.topology = share(Topology::grid(rows, cols));
-  return body;
-}
-
-/// A grid in the plane z, from (x, y) on.
-Positions flat(std::size_t rows, std::size_t cols, double x, double y, double cell_m, double z) {
-  Positions out;
-  for (std::size_t r = 0; r < rows; ++r) {
-    for (std::size_t c = 0; c < cols; ++c) {
-      out.emplace_back(x + cell_m * static_cast<double>(c), y + cell_m * static_cast<double>(r), z);
-    }
-  }
-  return out;
-}
-
-Positions moved(Positions x, const Vec3& by) {
-  for (Vec3& p : x) p += by;
-  return x;
+  return bodyOf(name, Topology::grid(rows, cols));
 }
 
 /// One triangle.
-Body triangle(const std::string& name) {
-  Body body;
-  body.name = name;
-  body.topology = share(Topology::fromTriangles(3, {{0, 1, 2}}));
-  return body;
-}
+Body triangle(const std::string& name) { return bodyOf(name, Topology::fromTriangles(3, {{0, 1, 2}})); }
 
 /// Leaves of edge 1, 2 and 4, in no order.
 std::shared_ptr<const VoxelSurface> randomMap(const Draw& draw, double resolution_m) {
@@ -60,22 +36,18 @@ std::shared_ptr<const VoxelSurface> randomMap(const Draw& draw, double resolutio
   for (int x = -3; x < 3; ++x) {
     for (int y = -3; y < 3; ++y) {
       for (int z = -1; z < 1; ++z) {
-        const auto key = [](int k) { return static_cast<std::uint16_t>(32768 + k); };
         switch (draw(0, 3)) {
           case 0:
-            leaves.push_back({{key(4 * x), key(4 * y), key(4 * z)}, 4});
+            leaves.push_back(voxelAt(4 * x, 4 * y, 4 * z, 4));
             break;
           case 1:
             for (int i = 0; i < 8; ++i) {
-              if (draw(0, 1)) {
-                leaves.push_back({{key(4 * x + 2 * (i & 1)), key(4 * y + (i & 2)), key(4 * z + (i & 4) / 2)}, 2});
-              }
+              if (draw(0, 1)) leaves.push_back(voxelAt(4 * x + 2 * (i & 1), 4 * y + (i & 2), 4 * z + (i & 4) / 2, 2));
             }
             break;
           case 2:
             for (int i = 0; i < 64; ++i) {
-              if (draw(0, 2) == 0)
-                leaves.push_back({{key(4 * x + i % 4), key(4 * y + i / 4 % 4), key(4 * z + i / 16)}, 1});
+              if (draw(0, 2) == 0) leaves.push_back(voxelAt(4 * x + i % 4, 4 * y + i / 4 % 4, 4 * z + i / 16));
             }
             break;
           default:
@@ -176,7 +148,7 @@ TEST(Patches, AreTheSameBitsForAnyNumberOfThreads) {
 
 TEST(Patches, AFineClothInsideOfOneLargeTriangleIsOne) {
   Step step;
-  step.bodies = {moving(sheet("cloth", 9, 9), flat(9, 9, 0, 0, 0.01, 0.005), flat(9, 9, 0, 0, 0.01, -0.005)),
+  step.bodies = {moving(sheet("cloth", 9, 9), gridAt(9, 9, 0.01, {0, 0, 0.005}), gridAt(9, 9, 0.01, {0, 0, -0.005})),
                  moving(triangle("table"), {Vec3(-9, -9, 0), Vec3(9, -9, 0), Vec3(0, 9, 0)},
                         {Vec3(-9, -9, 0), Vec3(9, -9, 0), Vec3(0, 9, 0)})};
   const Outcome outcome = Detector(withPatches()).run(step);
@@ -212,39 +184,23 @@ TEST(Patches, TwoFingersUnderASheetStayTwoAlsoUnderOneTriangle) {
   const Positions large = {Vec3(-2, -2, 0.05), Vec3(2, -2, 0.05), Vec3(0, 4, 0.05)};
   for (const bool fine : {false, true}) {
     const Body cloth = fine ? sheet("cloth", 41, 41) : triangle("cloth");
-    const Positions t0 = fine ? flat(41, 41, -0.203, -0.207, 0.02, 0.05) : large;
+    const Positions t0 = fine ? gridAt(41, 41, 0.02, {-0.203, -0.207, 0.05}) : large;
     Step step;
-    step.bodies = {moving(cloth, t0, moved(t0, Vec3(0, 0, -0.06))), moving(hand, fingers, fingers)};
+    step.bodies = {moving(cloth, t0, movedBy(t0, Vec3(0, 0, -0.06))), moving(hand, fingers, fingers)};
     const Outcome outcome = Detector(withPatches()).run(step);
     ASSERT_EQ(outcome.patches.size(), 2u) << (fine ? "fine" : "one triangle");
     EXPECT_LT(std::abs(outcome.patches[0].centroid.x() - outcome.patches[1].centroid.x()) - 0.3, 0.05);
   }
 }
 
-std::shared_ptr<const VoxelSurface> boxes(double resolution_m, const std::vector<std::array<int, 6>>& boxes) {
-  std::vector<OccupiedLeaf> leaves;
-  for (const auto& b : boxes) {
-    for (int x = b[0]; x < b[3]; ++x) {
-      for (int y = b[1]; y < b[4]; ++y) {
-        for (int z = b[2]; z < b[5]; ++z) {
-          leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y),
-                             static_cast<std::uint16_t>(32768 + z)},
-                            1});
-        }
-      }
-    }
-  }
-  return VoxelSurface::build(resolution_m, leaves);
-}
-
 TEST(Patches, AClothOnATableIsOneWhateverTheVoxelsAndTwoPostsAreTwo) {
-  const Positions t0 = flat(21, 21, 0.0063, 0.0063, 0.02, 0.01), t1 = moved(t0, Vec3(0, 0, -0.02));
+  const Positions t0 = gridAt(21, 21, 0.02, {0.0063, 0.0063, 0.01}), t1 = movedBy(t0, Vec3(0, 0, -0.02));
   Step step;
   step.bodies = {moving(sheet("cloth", 21, 21), t0, t1)};
   // A table of voxels coarser than the cloth, as fine, and finer.
   for (const double resolution_m : {0.05, 0.021, 0.005}) {
     const int n = static_cast<int>(0.5 / resolution_m);
-    step.map.surface = boxes(resolution_m, {{-2, -2, -8, n, n, 0}});
+    step.map.surface = VoxelSurface::build(resolution_m, voxelsOfBox({-2, -2, -8}, {n, n, 0}));
     const Outcome outcome = Detector(withPatches()).run(step);
     ASSERT_EQ(outcome.patches.size(), 1u) << resolution_m;
     EXPECT_EQ(outcome.patches[0].body, (std::array<std::uint16_t, 2>{0, OBSTACLE_BODY}));
@@ -252,7 +208,9 @@ TEST(Patches, AClothOnATableIsOneWhateverTheVoxelsAndTwoPostsAreTwo) {
     EXPECT_LE(outcome.patches[0].area_m2, 0.4 * 0.4 * (1 + 1e-9)) << resolution_m;
     EXPECT_NEAR(outcome.patches[0].toc_lower, 0.5, 1e-6);
   }
-  step.map.surface = boxes(0.02, {{2, 2, -2, 5, 5, 0}, {12, 12, -2, 15, 15, 0}});
+  std::vector<OccupiedLeaf> posts = voxelsOfBox({2, 2, -2}, {5, 5, 0});
+  for (const OccupiedLeaf& leaf : voxelsOfBox({12, 12, -2}, {15, 15, 0})) posts.push_back(leaf);
+  step.map.surface = VoxelSurface::build(0.02, posts);
   EXPECT_EQ(Detector(withPatches()).run(step).patches.size(), 2u) << "two posts";
   // A patch is as fine as the mesh is: one triangle over both is one. Of its area counts what the voxels have of it.
   step.bodies = {moving(triangle("cover"), {Vec3(-2, -2, 0.01), Vec3(2, -2, 0.01), Vec3(0, 4, 0.01)},
@@ -263,21 +221,21 @@ TEST(Patches, AClothOnATableIsOneWhateverTheVoxelsAndTwoPostsAreTwo) {
 }
 
 TEST(Patches, TwoPlacesOnOneClothStayTwo) {
-  const Positions t0 = flat(31, 31, 0, 0, 0.02, 0.01);
+  const Positions t0 = gridAt(31, 31, 0.02, {0, 0, 0.01});
   const auto pin = [](double x, double y) {
     return Positions{Vec3(x, y, 0), Vec3(x + 0.01, y, -0.1), Vec3(x, y + 0.01, -0.1)};
   };
   Step step;
-  step.bodies = {moving(sheet("cloth", 31, 31), t0, moved(t0, Vec3(0, 0, -0.02))),
+  step.bodies = {moving(sheet("cloth", 31, 31), t0, movedBy(t0, Vec3(0, 0, -0.02))),
                  moving(triangle("a"), pin(0.105, 0.103), pin(0.105, 0.103)),
                  moving(triangle("b"), pin(0.111, 0.108), pin(0.111, 0.108))};
   EXPECT_EQ(Detector(withPatches()).run(step).patches.size(), 2u) << "of different partners, in the same place";
 }
 
 TEST(Patches, SurfacesThatCrossAtTheStartAreInThem) {
-  const Positions flat_t0 = flat(5, 5, 0, 0, 0.1, 0);
+  const Positions flat_t0 = gridAt(5, 5, 0.1, {0, 0, 0});
   Positions upright;
-  for (const Vec3& p : flat(5, 5, 0.03, -0.17, 0.1, 0.21)) upright.emplace_back(p.x(), p.z(), p.y());
+  for (const Vec3& p : gridAt(5, 5, 0.1, {0.03, -0.17, 0.21})) upright.emplace_back(p.x(), p.z(), p.y());
   Step step;
   step.bodies = {moving(sheet("lying", 5, 5), flat_t0, flat_t0), moving(sheet("upright", 5, 5), upright, upright)};
   const Outcome outcome = Detector(withPatches()).run(step);
@@ -309,9 +267,9 @@ TEST(Patches, AreOfAllContactsAlsoOfThoseThatAreNotListed) {
   }
   // A contact that lasts is in a patch, also where it is not listed.
   Step resting;
-  const Positions x = flat(5, 5, 0, 0, 0.02, 0);
+  const Positions x = gridAt(5, 5, 0.02, {0, 0, 0});
   resting.bodies = {moving(sheet("cloth", 5, 5), x, x)};
-  resting.map.surface = boxes(0.02, {{-2, -2, -2, 9, 9, 0}});
+  resting.map.surface = VoxelSurface::build(0.02, voxelsOfBox({-2, -2, -2}, {9, 9, 0}));
   options = withPatches();
   options.suppress_initial = true;
   const Outcome suppressed = Detector(options).run(resting);
@@ -365,7 +323,7 @@ TEST(Patches, WhatTouchesAtTheStartIsInitial) {
   for (int b = 0; b < 2; ++b) {
     StepBody body;
     body.topology = Topology::grid(6, 6);
-    body.t0 = body.t1 = flat(6, 6, 0.375 * b, 0.25 * b, 1, 0);
+    body.t0 = body.t1 = gridAt(6, 6, 1, {0.375 * b, 0.25 * b, 0});
     for (Vec3& p : body.t1) p.z() += b == 0 ? 0 : -0.125;
     resting.bodies.push_back(body);
   }

@@ -3,35 +3,28 @@
 
 #include <cmath>
 
-#include "support/detector.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
+const Topology TWO_TRIANGLES = Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}});
+
 struct Fixture : testing::Test {
   // Two parallel triangles, apart in the direction x-z, which is not among the linear filter's: pairs get past it.
   const Positions rest{{0, 0, 0},           {1, 0, 1},           {0, 1, 0}, {-0.0625, 0, 0.0625},
                        {0.9375, 0, 1.0625}, {-0.0625, 1, 0.0625}};
-  std::shared_ptr<const Topology> topology =
-      std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
   Detector detector{[] {
     Options o;
     o.check_start_state = false;
     return o;
   }()};
 
-  Positions moved(const Vec3& by) const {
-    Positions p = rest;
-    for (Vec3& v : p) v += by;
-    return p;
-  }
+  Positions moved(const Vec3& by) const { return movedBy(rest, by); }
   std::uint64_t selfPairs(const Positions& t0, const Positions& t1, bool continues) {
-    Body body;
-    body.name = "cloth";
-    body.topology = topology;
     if (!continues) detector.history().clear();
-    const Outcome result = detector.run(stepOf(body, t0, t1));
+    const Outcome result = detector.run(stepOf(bodyOf("cloth", TWO_TRIANGLES), t0, t1));
     EXPECT_TRUE(result.contacts.empty());
     return result.stats[Effect::SELF_COLLISION].in;
   }
@@ -63,13 +56,9 @@ TEST_F(Fixture, RotationIsNoTranslation) {
 
 TEST(Translation, ABodyThatTouchedItselfIsTestedAgain) {
   // Two triangles that coincide in a point for ever.
-  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
   const Positions x{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 0}, {1, 1, 1}, {0, 1, 1}};
-  Body body;
-  body.name = "pair";
-  body.topology = topology;
   Detector detector;
-  const Step step = stepOf(body, x, x);
+  const Step step = stepOf(bodyOf("pair", TWO_TRIANGLES), x, x);
   const std::size_t first = detector.run(step).contacts.size();
   ASSERT_GT(first, 0u);
   EXPECT_EQ(detector.run(step).contacts.size(), first);

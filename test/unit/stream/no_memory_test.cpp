@@ -5,13 +5,10 @@
 #include <array>
 #include <map>
 #include <memory>
-#include <new>
 #include <optional>
 
-#include "dccd/stream.h"
 #include "dccd/tolerances.h"
-#include "support/step_support.h"
-#include "unit/allocations.h"
+#include "unit/failing_allocations.h"
 #include "unit/stream/patch_stream.h"
 
 namespace dccd {
@@ -95,18 +92,6 @@ void expectInOrder(const Outcome& outcome, std::map<std::uint64_t, PatchEventKin
   }
 }
 
-/// `act` with one allocation after the other failing, until it needs no more. Returns how many there were.
-template <class Act>
-int failingEverywhere(const Act& act) {
-  for (int n = 0;; ++n) {
-    if (!act(n)) return n;
-    if (testing::Test::HasFailure()) {
-      ADD_FAILURE() << "allocation " << n;
-      return n;
-    }
-  }
-}
-
 TEST(NoMemory, AStepThatFailsAnywhereLeavesNothingHalfDone) {
   std::vector<Outcome> expected;
   Cloths whole;
@@ -119,19 +104,13 @@ TEST(NoMemory, AStepThatFailsAnywhereLeavesNothingHalfDone) {
     std::map<std::uint64_t, PatchEventKind> last;
     for (int k = 0; k < before; ++k) expectInOrder(cloths.feed(k), last);
     cloths.push(before);
-    bool met = false;
     std::optional<Outcome> outcome;
-    {
-      const AllocationFailure failure(n, lasts);
-      try {
-        outcome.emplace();
-        cloths.monitor().next(0, *outcome);
-      } catch (const std::bad_alloc&) {
-        outcome.reset();  // not even what has failed could be told: it is done again
-      }
-      met = failure.met();
-    }
-    if (!outcome) outcome = cloths.next();
+    const bool met = failsAt(n, lasts, [&] {
+      Outcome told;
+      cloths.monitor().next(0, told);
+      outcome = std::move(told);
+    });
+    if (!outcome) outcome = cloths.next();  // not even what has failed could be told: it is done again
     failed += outcome->status == StepStatus::INTERNAL_ERROR;
     expectInOrder(*outcome, last);
     for (int k = before + 1; k <= before + AFTER; ++k) {
@@ -160,14 +139,7 @@ TEST(NoMemory, QuestionsThatFailAnywhereLeaveNothingHalfDone) {
       const bool predicts = kind % 2 == 0, lasts = kind / 2 == 0;
       Cloths cloths;
       for (int k = 0; k < BEFORE; ++k) cloths.feed(k);
-      {
-        const AllocationFailure failure(n, lasts);
-        try {
-          predicts ? cloths.monitor().predict() : cloths.monitor().checkNow();
-        } catch (const std::bad_alloc&) {
-        }
-        met = met || failure.met();
-      }
+      met |= failsAt(n, lasts, [&] { predicts ? cloths.monitor().predict() : cloths.monitor().checkNow(); });
       expectSame(cloths.monitor().checkNow(), check);
       expectSame(cloths.monitor().predict(), prediction);
       expectSame(cloths.feed(BEFORE), next);

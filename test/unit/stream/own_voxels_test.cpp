@@ -1,12 +1,12 @@
 // Which voxels of a map are a body's own: the rule of stream/own_voxels.h, each of its sentences.
 #include <gtest/gtest.h>
 
-#include <functional>
-#include <new>
 #include <set>
 
 #include "dccd/assurance.h"
-#include "unit/allocations.h"
+#include "support/closed_meshes.h"
+#include "support/shapes.h"
+#include "unit/failing_allocations.h"
 #include "unit/stream/monitor_support.h"
 
 namespace dccd {
@@ -24,18 +24,23 @@ Cells operator+(Cells a, const Cells& b) {
   return a;
 }
 
-/// 10 x 10 voxels below z = `top` * 0.1 m, one thick.
-Cells slab(int top) {
+/// One layer of voxels, from x and y on to before `to`.
+Cells layer(int z, int from, int to) {
   Cells cells;
-  for (int x = 0; x < 10; ++x) {
-    for (int y = 0; y < 10; ++y) cells.insert({x, y, top - 1});
+  for (int x = from; x < to; ++x) {
+    for (int y = from; y < to; ++y) cells.insert({x, y, z});
   }
   return cells;
 }
+/// 10 x 10 voxels below z = `top` * 0.1 m.
+Cells slab(int top) { return layer(top - 1, 0, 10); }
+/// The voxels in which a sheet lies.
+Cells voxelsOf(double z) { return layer(static_cast<int>(std::floor(z / VOXEL_M)), 3, 8); }
 
-OccupiedLeaf leafOf(const Cell& cell, std::uint32_t size = 1) {
-  const auto key = [](int i) { return static_cast<std::uint16_t>(32768 + i); };
-  return {{key(cell[0]), key(cell[1]), key(cell[2])}, size};
+std::vector<OccupiedLeaf> leavesOf(const Cells& cells) {
+  std::vector<OccupiedLeaf> leaves;
+  for (const auto& [x, y, z] : cells) leaves.push_back(voxelAt(x, y, z));
+  return leaves;
 }
 
 ObstacleMap mapOf(double resolution_m, std::vector<OccupiedLeaf> leaves, StampNs stamp_ns,
@@ -49,19 +54,8 @@ ObstacleMap mapOf(double resolution_m, std::vector<OccupiedLeaf> leaves, StampNs
 
 /// A square sheet of 0.4 m side at x, y in [0.31, 0.71], flat at the height z.
 MeshFrame sheet(StampNs stamp_ns, double z) {
-  static const auto topology = std::make_shared<const Topology>(Topology::grid(9, 9));
-  MeshFrame frame{stamp_ns, topology, {}, false, Eigen::Isometry3d::Identity()};
-  for (int i = 0; i < 81; ++i) frame.positions.push_back({0.31 + 0.05 * (i % 9), 0.31 + 0.05 * (i / 9), z});
-  return frame;
-}
-
-/// The voxels in which a sheet lies.
-Cells voxelsOf(double z) {
-  Cells cells;
-  for (int x = 3; x <= 7; ++x) {
-    for (int y = 3; y <= 7; ++y) cells.insert({x, y, static_cast<int>(std::floor(z / VOXEL_M))});
-  }
-  return cells;
+  static const auto topology = share(Topology::grid(9, 9));
+  return {stamp_ns, topology, gridAt(9, 9, 0.05, {0.31, 0.31, z})};
 }
 
 class OwnVoxels : public ::testing::Test {
@@ -77,13 +71,8 @@ class OwnVoxels : public ::testing::Test {
     monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{body});
   }
   void map(StampNs stamp_ns, const Cells& cells, const Cells* known = nullptr) {
-    std::vector<OccupiedLeaf> leaves, seen;
-    for (const Cell& cell : cells) leaves.push_back(leafOf(cell));
-    ObstacleMap map = mapOf(VOXEL_M, leaves, stamp_ns);
-    if (known) {
-      for (const Cell& cell : cells + *known) seen.push_back(leafOf(cell));
-      map.known = KnownSpace::build(VOXEL_M, seen);
-    }
+    ObstacleMap map = mapOf(VOXEL_M, leavesOf(cells), stamp_ns);
+    if (known) map.known = KnownSpace::build(VOXEL_M, leavesOf(cells + *known));
     monitor_->setMap(std::move(map));
   }
   Outcome feed(StampNs stamp_ns, double z) {
@@ -133,28 +122,20 @@ TEST_F(OwnVoxels, WhatWasThereBeforeStaysAnObstacle) {
 
 /// The step that takes a map fails at one allocation after the other; the next one has it, or proves nothing.
 TEST_F(OwnVoxels, AMapOfAStepThatFailedIsNotLost) {
-  int n = 0;
-  for (bool met = true; met && !HasFailure(); ++n) {
+  const int allocations = failingEverywhere([&](int n) {
     SetUp();
     hoverAboveFloor();
     map(150 * MS, slab(1) + voxelsOf(0.25));
     monitor_->countReceived(0);
     monitor_->push(0, sheet(200 * MS, 0.55), NOW);
     Outcome outcome;
-    {
-      const AllocationFailure failure(n, false);
-      try {
-        monitor_->next(NOW, outcome);
-      } catch (const std::bad_alloc&) {  // not even that could be told: it is done again
-      }
-      met = failure.met();
-    }
+    const bool met = failsAt(n, false, [&] { monitor_->next(NOW, outcome); });
     while (monitor_->next(NOW, outcome)) {
     }
-    const Outcome later = feed(300 * MS, 0.22);
-    EXPECT_EQ(assuranceOf(later).touching, Touching::NEW) << "allocation " << n;
-  }
-  EXPECT_GT(n, 10);
+    EXPECT_EQ(assuranceOf(feed(300 * MS, 0.22)).touching, Touching::NEW);
+    return met;
+  });
+  EXPECT_GE(allocations, 10);
 }
 
 TEST_F(OwnVoxels, WhatIsOwnStaysSoUntilAMapHasClearedIt) {
@@ -216,11 +197,9 @@ TEST_F(OwnVoxels, TheFirstMapOnTrust) {
 
 // The price: an obstacle that appears within reach.
 TEST_F(OwnVoxels, WhatAppearsWithinReachOfABodyIsNamedAsLeftOut) {
-  hoverAboveFloor();
-  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{8, 5, 5}, {9, 5, 5}});  // beside it: 0.09 and 0.19 m away
   start(0.1);
   hoverAboveFloor();
-  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{8, 5, 5}, {9, 5, 5}});
+  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{8, 5, 5}, {9, 5, 5}});  // beside it: 0.09 and 0.19 m away
   const Outcome outcome = feed(200 * MS, 0.55);
   EXPECT_EQ(own(outcome), 26u);
   EXPECT_EQ(outcome.excluded, std::vector<std::string>{"26 voxels of the map as own of body 'cloth'"});
@@ -278,7 +257,7 @@ TEST_F(OwnVoxels, AnObstacleThatAMapForgetsStaysOne) {
 
 TEST_F(OwnVoxels, OfALargeLeafOnlyWhatIsWithinReach) {
   hoverAboveFloor();
-  const auto large = [&](StampNs stamp_ns) { monitor_->setMap(mapOf(VOXEL_M, {leafOf({0, 0, 0}, 8)}, stamp_ns)); };
+  const auto large = [&](StampNs stamp_ns) { monitor_->setMap(mapOf(VOXEL_M, {voxelAt(0, 0, 0, 8)}, stamp_ns)); };
   large(150 * MS);
   const Outcome outcome = feed(200 * MS, 0.551);
   EXPECT_EQ(own(outcome), 36u + 25u) << "of its own layer, and of the one that begins 0.049 m above it";
@@ -401,9 +380,9 @@ TEST_F(OwnVoxels, AfterAClockThatWentBackTheWayIsKept) {
 
 TEST_F(OwnVoxels, AnotherFrameOrResolutionIsAFirstMap) {
   hoverAboveFloor();
-  monitor_->setMap(mapOf(0.2, {leafOf({1, 1, 2})}, 150 * MS));
+  monitor_->setMap(mapOf(0.2, {voxelAt(1, 1, 2)}, 150 * MS));
   EXPECT_EQ(doubted(feed(200 * MS, 0.55)), 1u);
-  monitor_->setMap(mapOf(0.2, {leafOf({1, 1, 2})}, 250 * MS, "odom"));
+  monitor_->setMap(mapOf(0.2, {voxelAt(1, 1, 2)}, 250 * MS, "odom"));
   EXPECT_EQ(doubted(feed(300 * MS, 0.55)), 1u);
 }
 
@@ -455,33 +434,30 @@ TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
       MonitorOptions options = loose();
       options.own_voxels_lag_s = 0;
       Monitor monitor(options, {body});
-      std::vector<Face> faces{{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                              {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+      const StepBody whole = box(Vec3::Zero(), Vec3::Ones());
+      std::vector<Face> faces = whole.topology.faces();
       if (!closed) faces.pop_back();
       for (Face& face : faces) {
         if (inside_out) std::swap(face[1], face[2]);
       }
-      const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(8, faces));
-      const auto box = [&, is_whole = finite](StampNs stamp_ns) {
-        MeshFrame frame{stamp_ns, topology, {}, true, Eigen::Isometry3d::Identity()};
-        for (int i = 0; i < 8; ++i) frame.positions.push_back(Vec3(i & 1, i >> 1 & 1, i >> 2));
-        if (!is_whole) frame.positions[7].setConstant(std::nan(""));
-        return frame;
-      };
-      monitor.push(0, box(0), NOW);
+      MeshFrame frame{0, share(Topology::fromTriangles(8, faces)), whole.t0, true};
+      if (!finite) frame.positions[7].setConstant(std::nan(""));
+      monitor.push(0, frame, NOW);
       only(monitor);
       monitor.setMap(mapOf(VOXEL_M, {}, 0));
-      monitor.push(0, box(100 * MS), NOW);
+      frame.stamp_ns = 100 * MS;
+      monitor.push(0, frame, NOW);
       only(monitor);
-      monitor.setMap(mapOf(VOXEL_M, {leafOf({5, 5, 5}), leafOf({15, 5, 5})}, 150 * MS));
-      monitor.push(0, box(200 * MS), NOW);
+      monitor.setMap(mapOf(VOXEL_M, {voxelAt(5, 5, 5), voxelAt(15, 5, 5)}, 150 * MS));
+      frame.stamp_ns = 200 * MS;
+      monitor.push(0, frame, NOW);
       EXPECT_EQ(own(only(monitor)), closed && finite && !shell ? 1u : 0u);
     }
   }
 }
 
 TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {
-  ObstacleMap table = mapOf(VOXEL_M, {leafOf({4, 4, 4})}, 0);
+  ObstacleMap table = mapOf(VOXEL_M, {voxelAt(4, 4, 4)}, 0);
   monitor_->setMapBeside(table);
   feed(0, 0.55);
   EXPECT_EQ(feed(50 * MS, 0.55).status, StepStatus::NO_MAP) << "it is no map by itself";

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dccd/stream.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -17,15 +18,8 @@ constexpr StampNs PERIOD_NS = 33000000;
 
 /// The table's top is the plane z = 0.
 inline std::shared_ptr<const VoxelSurface> table(double resolution_m) {
-  std::vector<OccupiedLeaf> leaves;
   const int n = static_cast<int>(std::ceil(1.0 / resolution_m));
-  for (int x = -n; x < n; ++x) {
-    for (int y = -n; y < n; ++y) {
-      leaves.push_back(
-          {{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), std::uint16_t{32767}}, 1});
-    }
-  }
-  return VoxelSurface::build(resolution_m, leaves);
+  return VoxelSurface::build(resolution_m, voxelsOfBox({-n, -n, -1}, {n, n, 0}));
 }
 
 /// A strip of cloth along x; height(column) [m].

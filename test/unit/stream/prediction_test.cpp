@@ -1,8 +1,7 @@
 // Predictions: what they find, what they know of their start, and that they change no step.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
+#include "support/shapes.h"
 #include "unit/stream/monitor_support.h"
 
 namespace dccd {
@@ -38,9 +37,7 @@ TEST_F(OneBody, PredictionsKnowTheirStartFromTheLastStep) {
       ASSERT_TRUE(feed(pair(stamp_ns += 100 * MS, tip_z)).answered);
       const Outcome ahead = monitor.predict(), question = monitor.checkNow();
       EXPECT_EQ(ahead.start_state, tip_z < 0 ? StartState::INTERSECTING : StartState::CLEAR) << tip_z;
-      EXPECT_TRUE(std::equal(ahead.intersections.begin(), ahead.intersections.end(), question.intersections.begin(),
-                             question.intersections.end(),
-                             [](const auto& a, const auto& b) { return a.body == b.body && a.vertex == b.vertex; }));
+      EXPECT_TRUE(same(ahead.intersections, question.intersections));
       EXPECT_EQ(ahead.stats[Stage::START_STATE].in, 0u) << toString(rung) << tip_z;
       EXPECT_EQ(question.stats[Stage::START_STATE].in > 0, tip_z < 0) << tip_z;
     }
