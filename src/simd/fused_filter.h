@@ -14,10 +14,10 @@
 // Bernstein coefficients of each are beyond the rounding margin on their side.
 // Planes: any normal n will do, so each pair gets one of its own. Orthogonal to the motion of one feature relative to
 // the other they hardly move, so that what passes by at any speed stays apart: this plane alone takes the survivors of
-// n-body from 665,000 to 51,000, of which 50,490 meet. The three coordinate planes cost a third of another one each.
-// One in which the features are seen undistorted, orthogonal to their mean normal, takes longer than the elementary
-// test of what it rejects: a hundredth of the pairs of cloth-ball, none of n-body's. Last come the other five of the
-// paper's eight.
+// n-body from 665,000 to 51,000, of which 50,490 meet. The three coordinate planes need no products more. A plane in
+// which the features are seen undistorted, orthogonal to their mean normal, takes longer than the elementary test of
+// what it rejects: a hundredth of the pairs of cloth-ball, none of n-body's. Last come the other five of the paper's
+// eight.
 //
 // Non-penetration filter (Tang et al. 2010): a.(b x c) is the cubic of coplanarity; no contact when its four Bernstein
 // coefficients have one strict sign.
