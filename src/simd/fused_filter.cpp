@@ -45,13 +45,12 @@ struct Quadratic {
 HWY_INLINE Quadratic cross(const Vec3V& a0, const Vec3V& a1, const Vec3V& b0, const Vec3V& b1) {
   return {cross(a0, b0), cross(a0, b1) + cross(a1, b0), cross(a1, b1)};
 }
-HWY_INLINE Quadratic operator+(const Quadratic& p, const Quadratic& q) { return {p.A + q.A, p.B + q.B, p.C + q.C}; }
 
 // What is asked of the coefficients of one scalar quadratic: are all above a positive bound, or all below a negative
 // one? The smallest and the largest tell. With AVX-512 the bits of the numbers are compared as integers, which units of
 // a processor do that do not multiply. What is above zero is in order as signed integers, above all else. What is below
 // zero is so as unsigned ones, the lowest last. Nothing is NaN while M is at most 2^30: a plane's normal is then at
-// most 20 M^2, and no product with a coefficient of at most 12 M^2 overflows, so that no two infinities are added.
+// most 6 M, and nothing overflows.
 #if DCCD_AVX512
 using DS = hn::RebindToSigned<DF>;
 using DU = hn::RebindToUnsigned<DF>;
@@ -95,15 +94,18 @@ struct Opposite {
   }
 };
 
+// component: of a vector, what is asked of the three coefficients of a quantity.
 template <bool EDGE_EDGE, class Component>
-HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const Quadratic& ab, const Quadratic& T,
+HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const Quadratic& ab,
                                  const Component& component, VF margin) {
-  const auto range = [&](const Quadratic& q) { return rangeOf(component(q.A), component(q.B), component(q.C)); };
-  Opposite o{range(bc)};
-  o.add(range(ca));
-  const Range r = range(ab);
+  const auto of = [&](const Quadratic& q) { return Vec3V{component(q.A), component(q.B), component(q.C)}; };
+  const auto range = [](const Vec3V& q) { return rangeOf(q.x, q.y, q.z); };
+  const Vec3V first = of(bc), second = of(ca), third = of(ab);
+  Opposite o{range(first)};
+  o.add(range(second));
+  const Range r = range(third);
   o.add(EDGE_EDGE ? negative(r) : r);
-  o.add(range(T));
+  o.add(range(first + second + third));
   return hn::And(isAbove(o.ends, margin), isBelow(o.ends, hn::Neg(margin)));
 }
 
@@ -190,7 +192,6 @@ HWY_INLINE hn::Mask<DF> rejected(const float* HWY_RESTRICT block, FusedPlanes pl
   const Quadratic bc = cross(p[0][1], p[1][1], p[0][2], p[1][2]);
   const Quadratic ca = cross(p[0][2], p[1][2], p[0][0], p[1][0]);
   const Quadratic ab = cross(p[0][0], p[1][0], p[0][1], p[1][1]);
-  const Quadratic bc_ca = bc + ca, T = bc_ca + ab;
 
   // Non-penetration.
   const VF f0 = dot(p[0][0], bc.A);
@@ -202,20 +203,16 @@ HWY_INLINE hn::Mask<DF> rejected(const float* HWY_RESTRICT block, FusedPlanes pl
   auto out = hn::Or(hn::Gt(f_lo, cubic_margin), hn::Lt(f_hi, hn::Neg(cubic_margin)));
 
   out = hn::Or(out, opposite<EDGE_EDGE>(
-                        bc, ca, ab, T, [](const Vec3V& v) { return v.x; }, margin));
+                        bc, ca, ab, [](const Vec3V& v) { return v.x; }, margin));
   out = hn::Or(out, opposite<EDGE_EDGE>(
-                        bc, ca, ab, T, [](const Vec3V& v) { return v.y; }, margin));
+                        bc, ca, ab, [](const Vec3V& v) { return v.y; }, margin));
   out = hn::Or(out, opposite<EDGE_EDGE>(
-                        bc, ca, ab, T, [](const Vec3V& v) { return v.z; }, margin));
+                        bc, ca, ab, [](const Vec3V& v) { return v.z; }, margin));
   if (planes != FusedPlanes::COORDINATE) {
-    const auto rejects = [&](const Vec3V& n) {
-      const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
-      const auto along = [&](const Vec3V& v) { return dot(n, v); };
-      return opposite<EDGE_EDGE>(bc, ca, ab, T, along, hn::Add(hn::Mul(margin, size), tiny));
-    };
-    const Quadratic& N = EDGE_EDGE ? bc_ca : T;
-    out = hn::Or(out, rejects(N.A + N.B + N.C));
-    out = hn::Or(out, rejects(relativeMotion<EDGE_EDGE>(p[0], p[1])));
+    const Vec3V n = relativeMotion<EDGE_EDGE>(p[0], p[1]);
+    const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
+    const auto along = [&](const Vec3V& v) { return dot(n, v); };
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, along, hn::Add(hn::Mul(margin, size), tiny)));
   }
   if (planes == FusedPlanes::ALL && !hn::AllTrue(d, out)) {
     const VF two = hn::Mul(hn::Set(d, 2.0f), margin), three = hn::Mul(hn::Set(d, 3.0f), margin);
@@ -223,15 +220,15 @@ HWY_INLINE hn::Mask<DF> rejected(const float* HWY_RESTRICT block, FusedPlanes pl
     const auto minus = [](VF a, VF b) { return hn::Sub(a, b); };
     // Normals of the paper's planes Z|X+Y, X-Y|Z, Y+Z|X+Z, X+Y|Y-Z, Y-Z|X-Y (Fig. 8), up to sign.
     out = hn::Or(out, opposite<EDGE_EDGE>(
-                          bc, ca, ab, T, [&](const Vec3V& v) { return minus(v.x, v.y); }, two));
+                          bc, ca, ab, [&](const Vec3V& v) { return minus(v.x, v.y); }, two));
     out = hn::Or(out, opposite<EDGE_EDGE>(
-                          bc, ca, ab, T, [&](const Vec3V& v) { return plus(v.x, v.y); }, two));
+                          bc, ca, ab, [&](const Vec3V& v) { return plus(v.x, v.y); }, two));
     out = hn::Or(out, opposite<EDGE_EDGE>(
-                          bc, ca, ab, T, [&](const Vec3V& v) { return minus(plus(v.x, v.y), v.z); }, three));
+                          bc, ca, ab, [&](const Vec3V& v) { return minus(plus(v.x, v.y), v.z); }, three));
     out = hn::Or(out, opposite<EDGE_EDGE>(
-                          bc, ca, ab, T, [&](const Vec3V& v) { return plus(minus(v.y, v.x), v.z); }, three));
+                          bc, ca, ab, [&](const Vec3V& v) { return plus(minus(v.y, v.x), v.z); }, three));
     out = hn::Or(out, opposite<EDGE_EDGE>(
-                          bc, ca, ab, T, [&](const Vec3V& v) { return plus(plus(v.x, v.y), v.z); }, three));
+                          bc, ca, ab, [&](const Vec3V& v) { return plus(plus(v.x, v.y), v.z); }, three));
   }
   return hn::And(out, hn::Le(M, hn::Set(d, LARGEST_M)));
 }
