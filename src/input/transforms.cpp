@@ -67,8 +67,14 @@ TransformFeed::Frame* TransformFeed::roomFor(const std::string& name) {
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
   const Frame* frame = frameOf(unslashed(transform.child_frame_id));
-  return frame && !frame->sent.empty() &&
-         static_cast<StampNs>(transform.header.stamp.toNSec()) < frame->sent.rbegin()->first - JUMP_BACK_NS;
+  if (!frame || frame->sent.empty()) return false;
+  const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+  const auto newest = std::prev(frame->sent.end()), at_stamp = frame->sent.find(stamp_ns);
+  if (stamp_ns < newest->first - JUMP_BACK_NS) return true;
+  if (at_stamp == frame->sent.end() || at_stamp == newest) return false;
+  const Pose &before = at_stamp->second.pose, now = poseOf(transform.transform);
+  return at_stamp->second.parent != frameOf(unslashed(transform.header.frame_id)) ||
+         before.translation != now.translation || before.rotation.coeffs() != now.rotation.coeffs();
 }
 
 /// Else it is kept, and those are forgotten that the buffer forgets with it.
@@ -91,8 +97,9 @@ void TransformFeed::clear() {
 
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return !is_static && std::any_of(message.transforms.begin(), message.transforms.end(),
-                                   [&](const auto& transform) { return goesBack(transform); });
+  return !is_static && std::any_of(message.transforms.begin(), message.transforms.end(), [&](const auto& transform) {
+    return problemOf(transform).empty() && goesBack(transform);
+  });
 }
 
 void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem) {

@@ -24,8 +24,9 @@ namespace dccd {
 constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
 /// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
-/// the end would otherwise be taken for ones of the beginning. Leaves out what tf2 would write a line to the console
-/// for, each time: repeated stamps above all. Any thread may call it.
+/// the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that was elsewhere
+/// at a stamp before its newest tells it, as after a simulation's reset. Leaves out what tf2 would write a line to the
+/// console for, each time: repeated stamps above all. Any thread may call it.
 class TransformFeed {
  public:
   /// tf2 forgets no name; further frames are left out.

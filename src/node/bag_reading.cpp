@@ -64,7 +64,7 @@ ros::Duration TransformWindow::length() { return TF_KEPT + TF_AHEAD; }
 void TransformWindow::meshComes(std::size_t body, StampNs stamp_ns, const ros::Time& at) {
   if (stamp_ns == 0) return;
   const auto [newest, first] = newest_mesh_.try_emplace(body, stamp_ns);
-  if (!first && stamp_ns < newest->second - JUMP_BACK_NS) {
+  if (!first && stamp_ns < newest->second) {
     meshes_went_back_ = at;
     newest_mesh_.clear();
     newest_mesh_[body] = stamp_ns;

@@ -77,6 +77,25 @@ TEST_F(TransformFeedTest, AFloodOfNamesIsToldOfInPartAndCountedWhole) {
   EXPECT_EQ(feed.unusable(), 1000u);
 }
 
+TEST_F(TransformFeedTest, AFrameThatWasElsewhereAtAStampBeginsAnew) {
+  Eigen::Isometry3d pose;
+  std::string reason;
+  for (const double stamp_s : {1.0, 1.25, 1.5}) feed.add(turned("finger", 1, stamp_s, 3), false);
+  EXPECT_FALSE(feed.add(turned("finger", 1, 1.25, 3), false)) << "the same once more, as a loop sends it";
+  EXPECT_FALSE(feed.add(turned("finger", 1, 1.125, 7), false)) << "late, and nothing contradicts it";
+  EXPECT_FALSE(feed.add(turned("finger", 1, 1.5, 4), false)) << "the newest stays what came first, as tf2 has it";
+  const tf2_msgs::TFMessage elsewhere = turned("finger", 1, 1.25, 5);
+  EXPECT_TRUE(feed.clears(elsewhere, false));
+  EXPECT_TRUE(feed.add(elsewhere, false));
+  ASSERT_TRUE(feed.lookup("world", "finger", 1250000000, pose, reason)) << reason;
+  EXPECT_EQ(pose.translation().x(), 5);
+  EXPECT_FALSE(feed.lookup("world", "finger", 1500000000, pose, reason)) << "that was before";
+  feed.add(turned("finger", 1, 1.5, 5), false);
+  EXPECT_TRUE(feed.add(turned("finger", 1, 1.25, 5, "arm"), false)) << "of another parent";
+  feed.add(turned("finger", 1, 1.5, 5, "arm"), false);
+  EXPECT_FALSE(feed.clears(turned("finger", std::numeric_limits<double>::quiet_NaN(), 1.25, 5), false)) << "left out";
+}
+
 TEST_F(TransformFeedTest, TheReasonOfAFrameWithoutAPlaceNamesThem) {
   XmlRpcValue tree = scene();
   tree["transform_timeout_s"] = 0.0;
