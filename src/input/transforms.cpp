@@ -170,7 +170,11 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
     ++change_;
     const Sent sent{parent, poseOf(transform.transform)};
     if (!frame->is_static) frame->is_static = is_static;
-    if (*frame->is_static) {
+    if (*frame->is_static != is_static) {
+      if (!isThere(*frame, sent)) dispute(transform, *frame);
+      continue;
+    }
+    if (is_static) {
       frame->fixed = sent;
     } else {
       if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
@@ -182,6 +186,32 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
     buffer_.setTransform(transform, "tf", is_static);
   }
   return cleared;
+}
+
+/// Where the frame was last, as far as that is told from the path of a step.
+bool TransformFeed::isThere(const Frame& frame, const Sent& sent) {
+  if (!*frame.is_static && frame.sent.empty()) return false;
+  const Sent& last = *frame.is_static ? frame.fixed : frame.sent.rbegin()->second;
+  return last.parent == sent.parent &&
+         (last.pose.translation - sent.pose.translation).norm() <= tolerance::RIGID_PATH_M &&
+         last.pose.rotation.angularDistance(sent.pose.rotation) <= tolerance::RIGID_PATH_M;
+}
+
+/// For good, as for tf2 a frame stays what it was first.
+void TransformFeed::dispute(const geometry_msgs::TransformStamped& transform, Frame& frame) {
+  frame.is_disputed = has_disputed_ = true;
+  leaveOut(transform, "it is on /tf and, elsewhere, on /tf_static; stop one of the two and start the monitor anew");
+}
+
+/// On the way as it is now; null: none.
+const TransformFeed::Frame* TransformFeed::disputedBetween(const std::string& target, const std::string& source) const {
+  if (!has_disputed_ || !findWay(target, source, newestParentOf)) return nullptr;
+  for (const Chain* chain : {&from_target_, &from_source_}) {
+    const auto end = std::prev(chain->end());
+    const auto found = std::find_if(chain->begin(), end, [](const Frame* frame) { return frame->is_disputed; });
+    if (found != end) return *found;
+  }
+  return nullptr;
 }
 
 /// Its rotation has the length 1.
@@ -207,6 +237,10 @@ const TransformFeed::Sent& TransformFeed::sentAt(const Frame& frame, StampNs sta
   frame.asked_change = change_;
   frame.asked_ns = stamp_ns;
   return frame.asked;
+}
+
+const TransformFeed::Frame* TransformFeed::newestParentOf(const Frame& frame) {
+  return frame.sent.empty() ? frame.fixed.parent : frame.sent.rbegin()->second.parent;
 }
 
 /// Both chains, up to where the two meet. False: they do not.
@@ -244,6 +278,10 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
   if (target == source) return true;
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
+    if (const Frame* const frame = disputedBetween(target, source)) {
+      reason = "'" + shortText(frame->name, MAX_NAME) + "' is on /tf and, elsewhere, on /tf_static";
+      return false;
+    }
     Pose of_target, of_source;
     // The newest common transform is tf2's to find, and so is the reason why there is none.
     if (stamp_ns > 0 && findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
@@ -273,10 +311,7 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
 template <class Take>
 void TransformFeed::forEachKept(const std::string& target, const std::string& source, Take take) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto parentOf = [](const Frame& frame) {
-    return frame.sent.empty() ? frame.fixed.parent : frame.sent.rbegin()->second.parent;
-  };
-  if (!findWay(target, source, parentOf)) return;
+  if (!findWay(target, source, newestParentOf)) return;
   for (const Chain* chain : {&from_target_, &from_source_}) {
     for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
       if (!(*chain)[i]->sent.empty()) take(*(*chain)[i]);

@@ -25,8 +25,9 @@ constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
 /// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
 /// the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that was elsewhere
-/// at a stamp before its newest tells it, as after a simulation's reset. Leaves out what tf2 would write a line to the
-/// console for, each time: repeated stamps above all. Any thread may call it.
+/// at a stamp before its newest tells it, as after a simulation's reset. A frame that is on /tf and, elsewhere, on
+/// /tf_static has no place: tf2 would have it at rest where it was sent last, at all times. Leaves out what tf2 would
+/// write a line to the console for, each time: repeated stamps above all. Any thread may call it.
 class TransformFeed {
  public:
   /// tf2 forgets no name; further frames are left out.
@@ -82,6 +83,7 @@ class TransformFeed {
     std::optional<bool> is_static;  ///< as tf2 takes it, for good, from what came first; none: it is a parent alone
     std::map<StampNs, Sent> sent;   ///< of one that moves
     Sent fixed;                     ///< of one that is static
+    bool is_disputed = false;       ///< it is on both topics, and not at one place
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;
     mutable StampNs asked_ns = 0;
@@ -97,6 +99,7 @@ class TransformFeed {
   std::uint64_t change_ = 1;                       // counts what was added
   mutable Chain from_target_, from_source_;        // buffers of a question
   std::size_t kept_count_ = 0;
+  bool has_disputed_ = false;
   std::atomic<std::uint64_t> unusable_{0};
   std::map<std::string, std::string> only_unusable_;  // per child frame that has had no usable one: what was wrong
   std::set<std::string> told_;
@@ -105,6 +108,10 @@ class TransformFeed {
   const Frame* frameOf(const std::string& name) const;
   Frame* roomFor(const std::string& name);
   bool goesBack(const geometry_msgs::TransformStamped& transform) const;
+  static bool isThere(const Frame& frame, const Sent& sent);
+  void dispute(const geometry_msgs::TransformStamped& transform, Frame& frame);
+  const Frame* disputedBetween(const std::string& target, const std::string& source) const;
+  static const Frame* newestParentOf(const Frame& frame);
   bool isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame);
   void clear();
   void leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem);

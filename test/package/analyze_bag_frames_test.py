@@ -56,28 +56,42 @@ class AnalyzeBagFramesTest(AnalyzeBagTestCase):
                         write_moving(bag, cloth[i % len(cloth)], stamp, at, at - genpy.Duration.from_sec(early_s))
                 self.assertEqual(self.statuses(looped), {'FIRST_FRAME': 1, 'OK': 2 * len(cloth) - 2, 'TIME_JUMP': 1})
 
-    def test_a_simulation_that_is_reset_soon(self):
-        """Two rounds of half a second with the same stamps, and the hand elsewhere in the second one, where it goes through the cloth."""
+    def with_hand(self, name, stamps_and_heights, static_height=None):
+        """What becomes of a cloth that rests, and a large triangle in the frame 'hand' at these heights above it."""
         cloth = [message for topic, message, _ in self.messages if topic == '/cloth'][0]
-        heights = [point[2] for point in point_cloud2.read_points(cloth, ('x', 'y', 'z'))]
-        start, bag_file, hand = self.messages[0][2], self.folder / 'reset.bag', self.folder / 'hand.obj'
+        top, start = max(vertex.z for vertex in cloth.vertices), self.messages[0][2]
+        bag_file, hand = self.folder / (name + '.bag'), self.folder / 'hand.obj'
         hand.write_text('v -9 -9 0\nv 9 -9 0\nv 0 9 0\nf 1 2 3\n')
         with rosbag.Bag(str(bag_file), 'w') as bag:
-            for k in range(12):
-                stamp, at = start + genpy.Duration.from_sec(0.1 * (k % 6)), start + genpy.Duration.from_sec(0.1 * k)
-                moving = TransformStamped(child_frame_id='hand')
-                moving.header.stamp, moving.header.frame_id, moving.transform.rotation.w = stamp, 'world', 1
-                moving.transform.translation.z = max(heights) + (5 if k < 6 else 0.35 - 0.1 * (k - 6))
-                bag.write('/tf', TFMessage([moving]), at)
+            for k, (stamp_s, height) in enumerate(stamps_and_heights):
+                stamp, at = start + genpy.Duration.from_sec(stamp_s), start + genpy.Duration.from_sec(0.1 * k)
+                place = TransformStamped(child_frame_id='hand')
+                place.header.stamp, place.header.frame_id, place.transform.rotation.w = stamp, 'world', 1
+                if k == 0 and static_height is not None:
+                    place.transform.translation.z = top + static_height
+                    bag.write('/tf_static', TFMessage([copy.deepcopy(place)]), at)
+                place.transform.translation.z = top + height
+                bag.write('/tf', TFMessage([place]), at)
                 message = copy.deepcopy(cloth)
                 message.header.stamp = stamp
                 bag.write('/cloth', message, at)
-        params = self.params('bodies: {cloth: {topic: /cloth, self_collision: false}, hand: {rigid: {mesh: %s, frame: hand}}}\n' % hand)
-        statuses = self.analyzed('reset', bag_file, *params)[-1]
+        bodies = '{cloth: {topic: /cloth, self_collision: false}, hand: {rigid: {mesh: %s, frame: hand}}}' % hand
+        statuses = self.analyzed(name, bag_file, *self.params('bodies: %s\n' % bodies))[-1]
+        return statuses, {int(row.split(',')[0]) for row in (self.folder / name / 'contacts.csv').read_text().splitlines()[1:]}
+
+    def test_a_simulation_that_is_reset_soon(self):
+        """Two rounds of half a second with the same stamps, and the hand elsewhere in the second one, where it goes through the cloth."""
+        rounds = [(0.1 * (k % 6), 5 if k < 6 else 0.35 - 0.1 * (k - 6)) for k in range(12)]
+        statuses, steps = self.with_hand('reset', rounds)
         self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': 10, 'TIME_JUMP': 1})
-        steps = {row.split(',')[0] for row in (self.folder / 'reset/contacts.csv').read_text().splitlines()[1:]}
         self.assertTrue(steps)
-        self.assertTrue(all(int(step) > 7 for step in steps), steps)
+        self.assertGreater(min(steps), 7)
+
+    def test_a_frame_that_is_static_and_moves(self):
+        """It goes through the cloth, and has no place; one that stays where it is static has one."""
+        path = [(0.1 * k, 0.35 - 0.1 * k) for k in range(6)]
+        self.assertEqual(self.with_hand('both', path, 5), ({'NO_TRANSFORM': 6}, set()))
+        self.assertEqual(self.with_hand('same', [(0.1 * k, 5) for k in range(6)], 5), ({'FIRST_FRAME': 1, 'OK': 5}, set()))
 
     def test_a_static_transform_that_changes(self):
         """The first one holds before it was recorded, the second one from then on: the cloth is elsewhere, once."""

@@ -96,6 +96,26 @@ TEST_F(TransformFeedTest, AFrameThatWasElsewhereAtAStampBeginsAnew) {
   EXPECT_FALSE(feed.clears(turned("finger", std::numeric_limits<double>::quiet_NaN(), 1.25, 5), false)) << "left out";
 }
 
+TEST_F(TransformFeedTest, AFrameOnBothTopicsHasNoPlaceUnlessTheyAgree) {
+  Eigen::Isometry3d pose;
+  std::string reason;
+  for (const bool static_first : {true, false}) {
+    const std::string tool = static_first ? "tool" : "other";
+    feed.add(turned(tool, 1, 1, 3), static_first);
+    feed.add(turned("tip of " + tool, 1, 1, 1, tool), true);
+    feed.add(turned(tool, 1, 1.5, 3.0005), !static_first);
+    EXPECT_TRUE(feed.lookup("world", "tip of " + tool, 1000000000, pose, reason)) << reason;
+    EXPECT_EQ(pose.translation().x(), 4);
+    EXPECT_TRUE(feed.takeComplaints().empty());
+    feed.add(turned(tool, 1, 2, 3.5), !static_first);
+    EXPECT_FALSE(feed.lookup("world", "tip of " + tool, 1000000000, pose, reason));
+    EXPECT_EQ(reason, "'" + tool + "' is on /tf and, elsewhere, on /tf_static");
+    EXPECT_FALSE(feed.lookup(tool, "world", 0, pose, reason)) << "the newest one, too";
+    EXPECT_TRUE(feed.lookup(tool, "tip of " + tool, 1000000000, pose, reason)) << reason;
+    ASSERT_EQ(feed.takeComplaints().size(), 1u);
+  }
+}
+
 TEST_F(TransformFeedTest, TheReasonOfAFrameWithoutAPlaceNamesThem) {
   XmlRpcValue tree = scene();
   tree["transform_timeout_s"] = 0.0;
