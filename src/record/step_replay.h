@@ -18,8 +18,8 @@ struct StepReplay {
 
 /// Computes the step with the recorded options, but without a deadline and on `threads` workers: neither may change an
 /// answer. A step that ran out of its budget, or was cut at what a step may find, was answered in part: then what it
-/// reported as certain must be there again, as far as no such limit cuts the replay. Throws std::invalid_argument when
-/// the options or bodies of the recording are not possible.
+/// reported as certain must be there again, as far as no such limit cuts the replay, nor its list of contacts. Throws
+/// std::invalid_argument when the options or bodies of the recording are not possible.
 DCCD_EXPORT StepReplay replayStep(const StepRecording& recording, int threads = 1);
 
 /// Bits that differ between two answers to the same step, one sentence each, ten at most. With earliest_only each may
