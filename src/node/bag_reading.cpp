@@ -1,6 +1,8 @@
 #include "node/bag_reading.h"
 
 #include <algorithm>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <stdexcept>
@@ -19,6 +21,140 @@ const ros::Duration TF_KEPT(60.0);
 // Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
 const ros::Duration SEAM(1.0);
 
+const std::string MARK = "#ROSBAG V", MARK_OF_2 = MARK + "2.0\n";
+
+/// Looks at each length and place in a bag of version 2.0. rosbag trusts them and reads past its buffers where one is
+/// wrong. What is in compressed chunks has a checksum of its own.
+class BagCheck {
+ public:
+  explicit BagCheck(const std::string& path) : file_(path, std::ios::binary), size_(std::filesystem::file_size(path)) {}
+
+  /// Throws rosbag::BagFormatException naming the first byte of a record that is none.
+  void check() {
+    if (textAt(0, std::min<std::uint64_t>(size_, MARK_OF_2.size())) != MARK_OF_2) return;
+    const Record first = recordAt(MARK_OF_2.size(), size_);
+    const auto index_at = number<std::uint64_t>(first, "index_pos");
+    const auto encryptor = first.fields.find("encryptor");
+    if (index_at == 0 || (encryptor != first.fields.end() && !encryptor->second.empty())) return;  // rosbag refuses it
+    std::uint64_t left = number<std::uint32_t>(first, "conn_count");
+    left += number<std::uint32_t>(first, "chunk_count");
+    bool in_index = false;
+    std::set<std::uint64_t> chunks;
+    std::vector<Record> infos;
+    std::optional<std::set<std::uint32_t>> messages;
+    for (std::uint64_t at = first.end; left > 0;) {
+      const Record record = recordAt(at, size_);
+      in_index = in_index || at == index_at;
+      left -= in_index;
+      if (record.op() == CHUNK) {
+        chunks.insert(at);
+        messages.reset();
+        if (text(record, "compression") == "none") messages = messagesIn(record);
+      } else if (record.op() == INDEX && messages) {
+        checkPlaces(record, *messages);
+      } else if (record.op() == CHUNK_INFO) {
+        infos.push_back(record);
+      }
+      at = record.end;
+    }
+    for (const Record& info : infos) {
+      if (chunks.count(number<std::uint64_t>(info, "chunk_pos")) == 0) fail(info.at);
+    }
+  }
+
+ private:
+  static constexpr char MESSAGE = 2, INDEX = 4, CHUNK = 5, CHUNK_INFO = 6;
+  static constexpr std::uint64_t ENTRY = 12;             // bytes in an index: time and place
+  static constexpr std::uint64_t MOST_HEADER = 1 << 20;  // bytes; those of rosbag have a hundred
+  struct Record {
+    std::uint64_t at = 0, data = 0, end = 0;
+    std::map<std::string, std::string> fields;
+    char op() const { return fields.at("op")[0]; }
+  };
+  std::ifstream file_;
+  std::uint64_t size_;
+
+  [[noreturn]] static void fail(std::uint64_t at) {
+    throw rosbag::BagFormatException("the record at byte " + std::to_string(at) + " is none");
+  }
+  void readTo(void* to, std::uint64_t at, std::uint64_t size) {
+    file_.seekg(static_cast<std::streamoff>(at));
+    if (!file_.read(static_cast<char*>(to), static_cast<std::streamsize>(size))) fail(at);
+  }
+  std::string textAt(std::uint64_t at, std::uint64_t size) {
+    std::string text(size, '\0');
+    readTo(text.data(), at, size);
+    return text;
+  }
+  std::uint32_t numberAt(std::uint64_t at) {
+    std::uint32_t number = 0;
+    readTo(&number, at, sizeof number);
+    return number;
+  }
+  /// What lies at `at`, with its length before it and no further than `end`.
+  std::uint64_t endOf(std::uint64_t at, std::uint64_t end) {
+    if (end - at < 4) fail(at);
+    const std::uint32_t size = numberAt(at);
+    if (size > end - at - 4) fail(at);
+    return at + 4 + size;
+  }
+  Record recordAt(std::uint64_t at, std::uint64_t end) {
+    Record record;
+    record.at = at;
+    const std::uint64_t header_end = endOf(at, end);
+    if (header_end - at > MOST_HEADER) fail(at);
+    const auto header = textAt(at + 4, header_end - at - 4);
+    for (std::size_t i = 0; i < header.size();) {
+      std::uint32_t size = 0;
+      if (header.size() - i < sizeof size) fail(at);
+      std::memcpy(&size, header.data() + i, sizeof size);
+      i += sizeof size;
+      if (size > header.size() - i) fail(at);
+      const std::string field = header.substr(i, size);
+      const std::size_t equals = field.find('=');
+      if (equals == std::string::npos) fail(at);
+      record.fields[field.substr(0, equals)] = field.substr(equals + 1);
+      i += size;
+    }
+    if (text(record, "op").size() != 1) fail(at);
+    record.data = header_end + 4;
+    record.end = endOf(header_end, end);
+    return record;
+  }
+  static std::string text(const Record& record, const std::string& name) {
+    const auto field = record.fields.find(name);
+    if (field == record.fields.end()) fail(record.at);
+    return field->second;
+  }
+  template <class Number>
+  static Number number(const Record& record, const std::string& name) {
+    const std::string bytes = text(record, name);
+    Number value = 0;
+    if (bytes.size() != sizeof value) fail(record.at);
+    std::memcpy(&value, bytes.data(), sizeof value);
+    return value;
+  }
+  std::set<std::uint32_t> messagesIn(const Record& chunk) {
+    std::set<std::uint32_t> places;
+    for (std::uint64_t at = chunk.data; at < chunk.end;) {
+      const Record record = recordAt(at, chunk.end);
+      if (record.op() == MESSAGE) places.insert(static_cast<std::uint32_t>(at - chunk.data));
+      at = record.end;
+    }
+    return places;
+  }
+  void checkPlaces(const Record& index, const std::set<std::uint32_t>& messages) {
+    const auto count = number<std::uint32_t>(index, "count");
+    if (count * ENTRY != index.end - index.data) fail(index.at);
+    const std::string entries = textAt(index.data, count * ENTRY);
+    for (std::size_t i = 0; i < entries.size(); i += ENTRY) {
+      std::uint32_t place = 0;
+      std::memcpy(&place, entries.data() + i + ENTRY - sizeof place, sizeof place);
+      if (messages.count(place) == 0) fail(index.at);
+    }
+  }
+};
+
 }  // namespace
 
 void openBag(const std::string& path, rosbag::Bag& bag) {
@@ -28,16 +164,16 @@ void openBag(const std::string& path, rosbag::Bag& bag) {
   }
   const std::string remedy = "; run: rosbag reindex " + path;
   try {
+    BagCheck(path).check();
     bag.open(path, rosbag::bagmode::Read);
   } catch (const rosbag::BagUnindexedException&) {
     throw std::runtime_error(path + ": the bag has no index, as its recording was not ended" + remedy);
   } catch (const rosbag::BagException& error) {
-    const std::string mark = "#ROSBAG V";
-    std::string begin(mark.size(), '\0');
+    std::string begin(MARK.size(), '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
     if (file.gcount() == 0) throw std::runtime_error(path + ": the file is empty: nothing was recorded");
-    if (begin != mark) throw std::runtime_error(path + ": the file is no bag: it does not begin with '" + mark + "'");
+    if (begin != MARK) throw std::runtime_error(path + ": the file is no bag: it does not begin with '" + MARK + "'");
     throw std::runtime_error(path + ": the bag is cut or damaged (" + shortText(error.what()) + ")" + remedy);
   }
 }

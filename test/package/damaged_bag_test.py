@@ -80,6 +80,21 @@ class DamagedBagTest(FolderTestCase):
         subprocess.run(['rosbag', 'reindex', str(half)], check=True, capture_output=True)
         self.assertEqual(self.analyze(half).returncode, 0, 'the remedy')
 
+    def test_lengths_and_places_that_are_wrong(self):
+        """rosbag trusts them: it read past its buffers, and was ended by a signal."""
+        whole = self.whole.read_bytes()
+        damages = {'index_pos': whole.index(b'index_pos=') + 10, 'chunk_pos': whole.rindex(b'chunk_pos=') + 10}
+        for op in (2, 3, 4, 5, 6, 7):  # message, file, index, chunk, chunk's info, connection
+            damages['length of the field op %d' % op] = whole.rindex(b'op=%c' % op) - 4
+        index_end, stamp = whole.index(b'op=\x06'), rospy.Time.from_sec(100 + 0.1 * 199)
+        damages['count of an index'] = whole.rindex(b'count=', 0, index_end) + 6
+        damages['place of a message'] = whole.rindex(struct.pack('<II', stamp.secs, stamp.nsecs), 0, index_end) + 8
+        for what, at in damages.items():
+            with self.subTest(what=what):
+                path = self.folder / 'wrong.bag'
+                path.write_bytes(whole[:at] + struct.pack('<I', 999999) + whole[at + 4:])
+                self.assertRegex(self.refused(path), r'the bag is cut or damaged \(the record at byte \d+ is none\)')
+
     def test_what_is_no_bag(self):
         self.assertIn('the file is empty: nothing was recorded', self.refused(self.cut(0)))
         other = self.folder / 'other.bag'
