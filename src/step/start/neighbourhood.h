@@ -21,6 +21,8 @@ struct FacesSharing {
   std::vector<std::uint32_t> begin, others;
   std::vector<simd::LanePairs> pairs;
   void build(const ClusterTree& faces, const SlotsAtVertex& at, Index first_vertex);
+  /// Adds to these, of the same groups, all pairs of faces of which neither stands for an edge. owns: Neighbourhood's.
+  void leaveOut(const std::vector<std::uint8_t>& owns);
   simd::KnownPairs view() const { return {begin.data(), others.data(), pairs.data()}; }
 };
 
@@ -37,7 +39,7 @@ struct Neighbourhood {
   std::vector<Index> internal_of_local;
   SlotsAtVertex edges, faces;
   /// By slots of faces: the slot of the edge from each corner to the next, if this face stands for that edge, else
-  /// NO_INDEX. Of an edge's faces the one of the lowest rank stands for it.
+  /// NO_INDEX. Of an edge's faces one that is not spared stands for it, of these that of the lowest rank.
   std::vector<std::array<std::uint32_t, 3>> own_edges;
   std::vector<std::uint8_t> owns;  ///< by slots of faces: bit k where the k-th of these is one
   /// Of each of faces.slots, which of the face's corners the vertex is.
@@ -48,6 +50,9 @@ struct Neighbourhood {
   Fans fans;             ///< whose slots are those of all groups of faces, and two more: of the views TURNS and 0
 
   void learn(const SceneArrays& scene, std::size_t body_index);
+
+ private:
+  std::vector<std::uint8_t> spareFaces(const SceneBody& body) const;
 };
 
 inline bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
