@@ -1,25 +1,19 @@
 """Bags that analyze_bag cannot open: one line with the file's name and the remedy, exit status 1; and the remedy helps."""
 import shutil
-import struct
-import subprocess
 import unittest
 
+import genpy
 import rosbag
-import rospy
-from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
 
-from checkout import TOOLS, FolderTestCase
+from bag_messages import cloud, transform, write_bag
+from checkout import TOOLS, FolderTestCase, run
 
 
-def cloud(stamp_s, frame='world'):
-    """Four points, flat."""
-    message = PointCloud2(height=2, width=2, point_step=12, row_step=24)
-    message.header.frame_id, message.header.stamp = frame, rospy.Time.from_sec(stamp_s)
-    message.fields = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate('xyz')]
-    message.data = b''.join(struct.pack('<3f', 0.1 * (i % 2), 0.1 * (i // 2), 0.0) for i in range(4))
-    return message
+def frame_of(number, frame='world'):
+    """Four points, flat, ten times a second."""
+    at = genpy.Time.from_sec(100 + 0.1 * number)
+    return '/cloth', cloud([(0.1 * (i % 2), 0.1 * (i // 2), 0.0) for i in range(4)], at, frame, rows=2), at
 
 
 class DamagedBagTest(FolderTestCase):
@@ -27,14 +21,13 @@ class DamagedBagTest(FolderTestCase):
         self.whole, self.unindexed = self.folder / 'whole.bag', self.folder / 'unindexed.bag'
         bag = rosbag.Bag(str(self.whole), 'w', chunk_threshold=4096)  # what of it is whole can be saved
         for k in range(200):
-            bag.write('/cloth', cloud(100 + 0.1 * k), rospy.Time.from_sec(100 + 0.1 * k))
+            bag.write(*frame_of(k))
         bag.flush()
         shutil.copy(self.whole, self.unindexed)
         bag.close()
 
-    def analyze(self, bag):
-        command = [str(TOOLS / 'analyze_bag'), str(bag), '--mesh', '/cloth', '--report', str(self.folder / 'report'), '--quiet']
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    def analyze(self, bag, *words):
+        return run(TOOLS / 'analyze_bag', bag, '--mesh', '/cloth', '--report', self.folder / 'report', '--quiet', *words, timeout=60)
 
     def refused(self, bag):
         """The one line that is said, with --mesh or without."""
@@ -42,8 +35,7 @@ class DamagedBagTest(FolderTestCase):
         self.assertEqual(ran.returncode, 1, ran.stderr)
         self.assertEqual(ran.stderr.count('\n'), 1, ran.stderr)
         self.assertIn(str(bag) + ': ', ran.stderr)
-        plain = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--report', str(self.folder / 'report')],
-                               capture_output=True, text=True, check=False, timeout=60)
+        plain = run(TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', timeout=60)
         self.assertEqual((plain.returncode, plain.stderr), (1, ran.stderr))
         return ran.stderr
 
@@ -58,7 +50,7 @@ class DamagedBagTest(FolderTestCase):
     def test_a_recording_that_was_not_ended(self):
         said = self.refused(self.unindexed)
         self.assertIn('the bag has no index, as its recording was not ended; run: rosbag reindex %s\n' % self.unindexed, said)
-        subprocess.run(['rosbag', 'reindex', str(self.unindexed)], check=True, capture_output=True)
+        self.assertEqual(run('rosbag', 'reindex', self.unindexed).returncode, 0)
         self.assertEqual(self.analyze(self.unindexed).returncode, 0, 'the remedy')
 
     def test_one_that_is_cut(self):
@@ -68,7 +60,7 @@ class DamagedBagTest(FolderTestCase):
                 path = self.cut(keep)
                 self.assertRegex(self.refused(path), r'the bag is cut or damaged \(.*\); run: rosbag reindex %s\n' % path)
         half = self.cut(size // 2)
-        subprocess.run(['rosbag', 'reindex', str(half)], check=True, capture_output=True)
+        self.assertEqual(run('rosbag', 'reindex', half).returncode, 0)
         self.assertEqual(self.analyze(half).returncode, 0, 'the remedy')
 
     def test_what_is_no_bag(self):
@@ -79,17 +71,12 @@ class DamagedBagTest(FolderTestCase):
 
     def test_a_quaternion_that_is_none(self):
         """The reason of the frame without a place, and the complaint, name it."""
-        path, turned = self.folder / 'turned.bag', TransformStamped(child_frame_id='camera')
-        turned.header.frame_id, turned.header.stamp, turned.transform.rotation.w = 'world', rospy.Time.from_sec(100), 1.2
-        with rosbag.Bag(str(path), 'w') as bag:
-            bag.write('/tf_static', TFMessage([turned]), rospy.Time.from_sec(100))
-            for k in range(2):
-                bag.write('/cloth', cloud(100 + 0.1 * k, 'camera'), rospy.Time.from_sec(100 + 0.1 * k))
+        start = genpy.Time.from_sec(100)
+        path = write_bag(self.folder / 'turned.bag', [('/tf_static', TFMessage([transform('camera', start, w=1.2)]), start),
+                                                      frame_of(0, 'camera'), frame_of(1, 'camera')])
         params = self.folder / 'world.yaml'
         params.write_text('fixed_frame: world\n')
-        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(path), '--mesh', '/cloth', '--params', str(params), '--report',
-                              str(self.folder / 'report'), '--quiet'],
-                             capture_output=True, text=True, check=False, timeout=60)
+        ran = self.analyze(path, '--params', params)
         self.assertEqual(ran.returncode, 3, ran.stderr)
         words = "transforms of 'camera' are left out: its rotation x y z w (0 0 0 1.2) has the length 1.2; publish a quaternion"
         self.assertIn('tf: ' + words, ran.stderr)
