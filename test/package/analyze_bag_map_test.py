@@ -2,25 +2,21 @@
 import copy
 import csv
 import json
-import struct
 import unittest
 
 import genpy
-import rosbag
 from geometry_msgs.msg import Pose, PoseArray
-from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import MarkerArray
 
 from analyze_bag_support import AnalyzeBagTestCase
+from bag_messages import cloud
 
 
 class AnalyzeBagMapTest(AnalyzeBagTestCase):
     def test_a_map_that_was_recorded_last(self):
-        late = self.folder / 'late.bag'
-        with rosbag.Bag(str(late), 'w') as bag:
-            for topic, message, at in self.messages:
-                bag.write(topic, message, at if topic == '/cloth' else self.messages[-1][2] + genpy.Duration(1))
-        self.expect_same(self.analyze('late', late))
+        end = self.messages[-1][2] + genpy.Duration(1)
+        late = [(topic, message, at if topic == '/cloth' else end) for topic, message, at in self.messages]
+        self.expect_same(self.analyze('late', self.write('late.bag', late)))
 
     def test_a_map_from_a_file(self):
         octomap = self.octomap()
@@ -35,16 +31,11 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         self.expect_same(self.analyze('file', bare, '--octomap', tree))
 
     def test_a_map_without_a_stamp_is_as_old_as_its_message(self):
-        unstamped, frames = self.folder / 'unstamped.bag', 0
         octomap = copy.deepcopy(self.octomap())
         octomap.header.stamp = genpy.Time()
-        with rosbag.Bag(str(unstamped), 'w') as bag:
-            start = next(at for topic, _, at in self.messages if topic == '/cloth')
-            bag.write('/octomap_binary', octomap, start)
-            for topic, message, at in self.messages:
-                if topic == '/cloth':
-                    bag.write(topic, message, at)
-                    frames += message.header.stamp - start > genpy.Duration.from_sec(0.31)
+        start = self.cloths[0][2]
+        unstamped = self.write('unstamped.bag', [('/octomap_binary', octomap, start)] + self.cloths)
+        frames = sum(message.header.stamp - start > genpy.Duration.from_sec(0.31) for _, message, _ in self.cloths)
         self.assertGreater(frames, 2)
         statuses = self.analyzed('unstamped', unstamped, *self.params('max_step_s: 1.0\noctomap_timeout_s: 0.31\n'))[-1]
         self.assertEqual(statuses['NO_MAP'], frames, statuses)
@@ -52,21 +43,12 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
 
     def test_a_map_that_is_made_of_clouds(self):
         """A plate that a sensor at the world's origin sees below the cloth, which sinks onto it."""
-        clouded = self.folder / 'clouded.bag'
-        at = next(at for topic, _, at in self.messages if topic == '/cloth')
-        cloths = [message for topic, message, _ in self.messages if topic == '/cloth']
-        height = sum(min(v.z for v in cloth.vertices) for cloth in (cloths[0], cloths[-1])) / 2
-        points = [(0.02 * i - 1, 0.02 * k - 1, height) for i in range(100) for k in range(100)]
-        cloud = PointCloud2(height=1, width=len(points), point_step=12, row_step=12 * len(points),
-                            data=b''.join(struct.pack('<3f', *p) for p in points))
-        cloud.fields = [PointField(name=n, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate('xyz')]
-        cloud.header.frame_id = 'world'
-        cloud.header.stamp = at
-        with rosbag.Bag(str(clouded), 'w') as bag:
-            for topic, message, when in self.messages:
-                if topic == '/cloth':
-                    bag.write('/points', cloud, when - genpy.Duration.from_sec(0.001))
-                    bag.write(topic, message, when)
+        height = sum(min(v.z for v in cloth.vertices) for _, cloth, _ in (self.cloths[0], self.cloths[-1])) / 2
+        plate = cloud([(0.02 * i - 1, 0.02 * k - 1, height) for i in range(100) for k in range(100)], self.cloths[0][2])
+        messages = []
+        for frame in self.cloths:
+            messages += [('/points', plate, frame[2] - genpy.Duration.from_sec(0.001)), frame]
+        clouded = self.write('clouded.bag', messages)
         words = self.params('obstacle_cloud_topic: points\nobstacle_resolution_m: 0.02\n')
         status, said, complaints, statuses = self.analyzed('clouded', clouded, *words)
         self.assertEqual((status, set(statuses)), (0, {'FIRST_FRAME', 'OK'}), complaints)
@@ -76,10 +58,10 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         status, _, complaints, statuses = self.analyzed('cloudless', self.bag, *words)
         self.assertEqual((status, set(statuses)), (3, {'FIRST_FRAME', 'NO_MAP'}))
         self.assertIn('the bag has no cloud on /points, which is to make the map', self.said)
-        cloud.fields.pop()
-        with rosbag.Bag(str(clouded), 'a') as bag:
-            bag.write('/points', cloud, self.messages[-1][2] - genpy.Duration.from_sec(0.0001))
-        status, _, complaints, statuses = self.analyzed('refused', clouded, *words)
+        flat = copy.deepcopy(plate)
+        flat.fields.pop()
+        messages.append(('/points', flat, self.messages[-1][2] - genpy.Duration.from_sec(0.0001)))
+        status, _, complaints, statuses = self.analyzed('refused', self.write('refused.bag', messages), *words)
         self.assertEqual((status, statuses['NO_MAP']), (3, 1))
         self.assertIn("the cloud was refused: there is no field 'z'", complaints)
 
@@ -129,16 +111,9 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         self.expect_mapless('nothing', 'nothing was checked against a map: the bag has none')
 
     def test_a_refused_map_makes_the_one_before_void(self):
-        start = self.messages[0][2]
-        bag = self.folder / 'void.bag'
-        with rosbag.Bag(str(bag), 'w') as written:
-            written.write('/octomap_binary', self.octomap(), start)
-            for i, (topic, message, at) in enumerate(self.messages):
-                if i == len(self.messages) // 2:
-                    written.write('/octomap_binary', MarkerArray(), at)
-                if topic == '/cloth':
-                    written.write(topic, message, at)
-        status, _, said, steps = self.analyzed('void', bag)
+        refused = ('/octomap_binary', MarkerArray(), self.messages[len(self.messages) // 2][2])
+        messages = [('/octomap_binary', self.octomap(), self.messages[0][2]), refused, *self.cloths]
+        status, _, said, steps = self.analyzed('void', self.write('void.bag', messages))
         self.assertEqual(status, 3)
         self.assertGreater(steps['OK'], 10)
         self.assertGreater(steps['NO_MAP'], 10, 'no map is better than an old one')

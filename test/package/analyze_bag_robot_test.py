@@ -1,14 +1,13 @@
 """A robot's links in a bag: the URDF comes from a file, tf from the bag."""
-import subprocess
 import unittest
 
 import genpy
-import rosbag
-from geometry_msgs.msg import Point, TransformStamped
+from geometry_msgs.msg import Point
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
+from bag_messages import transform, write_bag
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 URDF = CHECKOUT / 'test/ros/robot.urdf'
 
@@ -16,25 +15,20 @@ URDF = CHECKOUT / 'test/ros/robot.urdf'
 class AnalyzeBagRobotTest(FolderTestCase):
     def bag(self, lift):
         """A triangle sinks from 0.3 m to the ground in 0.3 s; the plate is held at 0.1 m, where tf carries it."""
-        path = self.folder / 'robot.bag'
-        with rosbag.Bag(str(path), 'w') as bag:
-            for frame in range(4):
-                at, height = genpy.Time(100 + 0.1 * frame), 0.3 - 0.1 * frame
-                marker = Marker(ns='cloth', type=Marker.TRIANGLE_LIST)
-                marker.header.stamp, marker.header.frame_id = at, 'world'
-                marker.pose.orientation.w = marker.scale.x = marker.scale.y = marker.scale.z = 1
-                marker.points = [Point(0, 0, height), Point(0.1, 0, height), Point(0, 0.1, height)]
-                bag.write('/cloth', marker, at)
-                if lift:
-                    plate = TransformStamped()
-                    plate.header.stamp, plate.header.frame_id, plate.child_frame_id = at, 'world', 'plate'
-                    plate.transform.translation.z, plate.transform.rotation.w = 0.1, 1
-                    bag.write('/tf', TFMessage([plate]), at)
-        return path
+        messages = []
+        for frame in range(4):
+            at, height = genpy.Time(100 + 0.1 * frame), 0.3 - 0.1 * frame
+            marker = Marker(ns='cloth', type=Marker.TRIANGLE_LIST)
+            marker.header.stamp, marker.header.frame_id = at, 'world'
+            marker.pose.orientation.w = marker.scale.x = marker.scale.y = marker.scale.z = 1
+            marker.points = [Point(0, 0, height), Point(0.1, 0, height), Point(0, 0.1, height)]
+            messages.append(('/cloth', marker, at))
+            if lift:
+                messages.append(('/tf', TFMessage([transform('plate', at, z=0.1)]), at))
+        return write_bag(self.folder / 'robot.bag', messages)
 
     def analyze(self, bag, *words):
-        command = [TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet', *words]
-        return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+        return run(TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet', *words)
 
     def test_the_links_are_bodies(self):
         ran = self.analyze(self.bag(True), '--robot', URDF)

@@ -1,11 +1,8 @@
 """A recorded scene and its analysis; for the tests of analyze_bag."""
 import collections
-import subprocess
 
-import rosbag
-
-from checkout import CHECKOUT, TOOLS, FolderTestCase
-from fleet_support import messages_of
+from bag_messages import messages_of, write_bag
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 OWN = '/collision_monitor/'
 
@@ -17,11 +14,12 @@ class AnalyzeBagTestCase(FolderTestCase):
         cls.bag = cls.folder / 'scene.bag'
         cls.tool('make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', cls.bag, '--frames', 40, '--quiet')
         cls.messages = messages_of(cls.bag)
+        cls.cloths = [message for message in cls.messages if message[0] == '/cloth']
         cls.plain = cls.analyze('plain', cls.bag)
 
     @classmethod
     def tool(cls, name, *words):
-        ran = subprocess.run([str(TOOLS / name)] + [str(w) for w in words], capture_output=True, text=True, check=False)
+        ran = run(TOOLS / name, *words)
         assert ran.returncode == 0, ran.stderr
         return ran
 
@@ -35,8 +33,7 @@ class AnalyzeBagTestCase(FolderTestCase):
     def analyzed(self, name, bag, *words):
         """Exit status, standard output and error, and the statuses of the steps; whatever comes of it."""
         report = self.folder / name
-        command = [TOOLS / 'analyze_bag', bag, '--report', report, '--quiet', *words]
-        ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+        ran = run(TOOLS / 'analyze_bag', bag, '--report', report, '--quiet', *words)
         self.assertIn(ran.returncode, (0, 3), ran.stderr)
         self.said = ran.stdout
         return ran.returncode, ran.stdout, ran.stderr, self.statuses_of(report)
@@ -48,14 +45,16 @@ class AnalyzeBagTestCase(FolderTestCase):
 
     def bag_with(self, name, *maps):
         """The scene's cloth and, at the bag's beginning, other messages: (topic, message)."""
-        path, start = self.folder / name, self.messages[0][2]
-        with rosbag.Bag(str(path), 'w') as bag:
-            for topic, message in maps:
-                bag.write(topic, message, start)
-            for topic, message, at in self.messages:
-                if topic == '/cloth':
-                    bag.write(topic, message, at)
-        return path
+        start = self.messages[0][2]
+        return self.write(name, [(topic, message, start) for topic, message in maps] + self.cloths)
+
+    def write(self, name, messages):
+        return write_bag(self.folder / name, messages)
+
+    def refused(self, bag, *words):
+        ran = run(TOOLS / 'analyze_bag', bag, '--report', self.folder / 'no', '--quiet', *words)
+        self.assertEqual(ran.returncode, 1, ran.stdout)
+        return ran.stderr
 
     def octomap(self):
         return next(message for topic, message, _ in self.messages if topic == '/octomap_binary')

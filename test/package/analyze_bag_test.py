@@ -1,15 +1,12 @@
 """analyze_bag as people use it: the same output for any number of threads, exit statuses, phases, the report at once."""
 import csv
+import copy
 import io
 import json
-import subprocess
 import unittest
 
-import rosbag
-
 from analyze_bag_support import OWN, AnalyzeBagTestCase
-from checkout import TOOLS
-from fleet_support import messages_of
+from bag_messages import by_topic, messages_of
 
 
 def bytes_of(message):
@@ -29,11 +26,7 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
         self.assertEqual(contents[0], contents[1])
 
     def test_a_bag_in_which_no_frame_is_answered(self):
-        short = self.folder / 'short.bag'
-        with rosbag.Bag(str(short), 'w') as bag:
-            for topic, message, at in [m for m in self.messages if m[0] == '/cloth'][:1]:
-                bag.write(topic, message, at)
-        status, _, said, steps = self.analyzed('short', short)
+        status, _, said, steps = self.analyzed('short', self.write('short.bag', self.cloths[:1]))
         self.assertEqual((status, steps), (3, {'FIRST_FRAME': 1}))
         self.assertIn('no frame was answered', said)
         lost = self.bag_with('lost.bag')
@@ -45,35 +38,21 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
         self.assertEqual((said + self.said).count('no transform'), 1, 'the reason is said once')
         self.assertIn('the bag has neither /tf nor /tf_static', said)
 
-    def refused(self, bag, *words):
-        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--report', str(self.folder / 'no'), '--quiet', *words],
-                             capture_output=True, text=True, check=False)
-        self.assertEqual(ran.returncode, 1, ran.stdout)
-        return ran.stderr
-
     def test_what_is_missing_or_misspelt_is_named_as_the_user_knows_it(self):
-        alone = self.folder / 'map_alone.bag'
-        with rosbag.Bag(str(alone), 'w') as bag:
-            bag.write('/octomap_binary', next(m for t, m, _ in self.messages if t == '/octomap_binary'), self.messages[0][2])
+        alone = self.write('map_alone.bag', [('/octomap_binary', self.octomap(), self.messages[0][2])])
         self.assertIn('no topic of a mesh type; the bag has /octomap_binary (octomap_msgs/Octomap)', self.refused(alone))
         self.assertIn('no topic /clth; the bag has /cloth (', self.refused(self.bag, '--mesh', '/clth'))
-        bodies = map(str, self.params('bodies: {cloth: {topic: /cloth}}\n'))
+        bodies = self.params('bodies: {cloth: {topic: /cloth}}\n')
         self.assertRegex(self.refused(self.bag, *bodies, '--mesh', '/clth'), '--mesh has no place beside the bodies of .*given.yaml')
         self.analyze('named', self.bag, *self.params('topic: /clth\n'), '--mesh', '/cloth')
         self.assertIn('--acuracy is no option; nearest is --accuracy', self.refused(self.bag, '--acuracy', 'exact'))
 
     def test_millimetres_are_named_in_the_headline(self):
-        large = self.folder / 'large.bag'
-        with rosbag.Bag(str(large), 'w') as bag:
-            for topic, message, at in self.messages:
-                if topic != '/cloth':
-                    continue
-                for v in message.vertices:
-                    v.x, v.y, v.z = 1000 * v.x, 1000 * v.y, 1000 * v.z
-                bag.write(topic, message, at)
-                for v in message.vertices:
-                    v.x, v.y, v.z = v.x / 1000, v.y / 1000, v.z / 1000
-        self.analyzed('large', large)
+        cloths = copy.deepcopy(self.cloths)
+        for _, message, _ in cloths:
+            for v in message.vertices:
+                v.x, v.y, v.z = 1000 * v.x, 1000 * v.y, 1000 * v.z
+        self.analyzed('large', self.write('large.bag', cloths))
         headline = json.loads((self.folder / 'large/report.json').read_text())['headline']
         self.assertRegex(headline, r'TELEPORT: .* m across: are its coordinates in millimetres\?')
 
@@ -94,21 +73,14 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
             partner = 'octomap' if phase == 'lay' else 'mesh'
             self.assertEqual([c['expected'] == '1' for c in marks], [c['body_1'] == partner for c in marks])
             self.assertEqual([{**c, 'expected': '0'} for c in marks], plain, 'nothing changes but the mark')
-            states, firsts = [], []
-            for topic, message, _ in messages_of(out):
-                if topic == OWN + 'state':
-                    states.append(message)
-                elif topic == OWN + 'first_contact':
-                    firsts.append(message)
+            states, firsts = (by_topic(out)[OWN + name] for name in ('state', 'first_contact'))
             self.assertTrue(all(len(s.expected) == 1 for s in states[1:]), 'said of each answer')
             self.assertEqual(sum(f.expected_contacts for f in firsts), sum(c['expected'] == '1' for c in marks))
             found[phase] = sum(f.contact for f in firsts), sum(s.touching == s.EXPECTED for s in states)
         self.assertGreater(found['fold'][0], found['lay'][0], 'steps with an alarm')
         self.assertGreater(found['lay'][1], found['fold'][1], 'steps in which all that touches is expected')
-        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(self.bag), '--report', str(self.folder / 'no'), '--quiet',
-                              *map(str, self.params(expected + 'phase: lie\n'))], capture_output=True, text=True, check=False)
-        self.assertEqual(ran.returncode, 1)
-        self.assertIn("phase is 'lie', which expected_contacts does not name; known phases are 'fold', 'lay'", ran.stderr)
+        self.assertIn("phase is 'lie', which expected_contacts does not name; known phases are 'fold', 'lay'",
+                      self.refused(self.bag, *self.params(expected + 'phase: lie\n')))
 
 
 if __name__ == '__main__':

@@ -1,5 +1,4 @@
 """analyze_fleet: many bags come to one database and page, whatever happens to the jobs."""
-import copy
 import csv
 import html
 import os
@@ -12,12 +11,11 @@ import time
 import unittest
 
 import genpy
-import rosbag
-from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
-from fleet_support import TABLES, fleet, make_scene, messages_of, rows_of, run
+from bag_messages import messages_of, transform, write_bag
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
+from fleet_support import TABLES, fleet, make_scene, rows_of
 
 FLEET = CHECKOUT / 'fleet'
 
@@ -204,17 +202,11 @@ class FleetTest(FolderTestCase):
             self.assertRegex(ran.stderr, r'(?m)^analyze_fleet: .*%s' % said)
             self.assertFalse(out.exists())
         self.assertEqual([p.name for p in full.iterdir()], ['thesis.txt'])
-        without = self.folder / 'without.bag'
-        with rosbag.Bag(str(without), 'w') as bag:
-            bag.write('/tf', TFMessage([TransformStamped()]), genpy.Time(1))
-        changes = self.folder / 'changes.bag'
-        frames = [m for m in messages_of(self.first) if m[0] == '/cloth']
-        with rosbag.Bag(str(changes), 'w') as bag:
-            for i, (topic, message, at) in enumerate(frames[:12]):
-                if i >= 6:
-                    message = copy.deepcopy(message)
-                    message.triangles = message.triangles[:-1]
-                bag.write(topic, message, at)
+        without = write_bag(self.folder / 'without.bag', [('/tf', TFMessage([transform('tool')]), genpy.Time(1))])
+        frames = [message for message in messages_of(self.first) if message[0] == '/cloth'][:12]
+        for _, message, _ in frames[6:]:
+            message.triangles = message.triangles[:-1]
+        changes = write_bag(self.folder / 'changes.bag', frames)
         ran = fleet(without, changes, '--params', self.params, '--out', self.folder / 'odd')
         self.assertEqual(ran.returncode, 4)
         self.assertRegex(ran.stderr, r'without: .*no topic /cloth; the bag has /tf')

@@ -7,8 +7,8 @@ import unittest
 import rosbag
 import yaml
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
-from scenes_test import CENTER, RESOLUTION_M, occupied_leaves, run, steps_of
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
+from scenes_test import CENTER, RESOLUTION_M, occupied_leaves, steps_of
 
 EMPTY_CLOUDS = 2
 

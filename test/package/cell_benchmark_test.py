@@ -1,12 +1,11 @@
 """The judge of `scripts/benchmark cell`: runs that are made up, so that what it says of them can be worked out by hand."""
 import importlib.util
-import subprocess
 import sys
 import unittest
 
 import yaml
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 HAS_NUMPY = importlib.util.find_spec('numpy') is not None
 if HAS_NUMPY:
@@ -104,8 +103,7 @@ class JudgeTest(FolderTestCase):
             self.assertEqual((page['monitor'], monitor['octomap_topic']), (monitor, page['obstacle']['topic']))
             path = self.folder / (scene + '.yaml')
             path.write_text(yaml.safe_dump(page))
-            recorded = subprocess.run([TOOLS / 'make_scene_bag', path, path.with_suffix('.bag'), '--frames', '2', '--quiet'],
-                                      capture_output=True, text=True, check=False)
+            recorded = run(TOOLS / 'make_scene_bag', path, path.with_suffix('.bag'), '--frames', 2, '--quiet')
             self.assertEqual(recorded.returncode, 0, recorded.stderr)
 
 

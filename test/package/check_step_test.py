@@ -1,16 +1,13 @@
 """check_step says "nothing touches" only where that is proved, else why not, and its exit status tells the two apart."""
 import json
 import math
-import pathlib
 import re
-import subprocess
-import tempfile
 import unittest
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 NOT_PROVED = 3
-TOOL = str(TOOLS / 'check_step')
+TOOL = TOOLS / 'check_step'
 
 
 def write(path, points, faces):
@@ -34,20 +31,19 @@ def faces_of(n=24, first=0):
     return faces
 
 
-class CheckStepTest(unittest.TestCase):
+class CheckStepTest(FolderTestCase):
     """Two sheets of 576 vertices; the upper one comes down."""
 
     FACES = faces_of() + faces_of(first=576)
 
     def run_on(self, ending, write_frame, frames, *flags):
         """write_frame(path, frame) for each of two frames, then the tool."""
-        with tempfile.TemporaryDirectory() as folder:
-            paths = [pathlib.Path(folder) / (name + ending) for name in '01']
-            for path, frame in zip(paths, frames):
-                write_frame(path, frame)
-            stats = pathlib.Path(folder) / 'stats.json'
-            done = subprocess.run([TOOL, *map(str, paths), '--stats', str(stats), *flags], capture_output=True, text=True)
-            self.stats = json.loads(stats.read_text())
+        paths = [self.folder / (name + ending) for name in '01']
+        for path, frame in zip(paths, frames):
+            write_frame(path, frame)
+        stats = self.folder / 'stats.json'
+        done = run(TOOL, *paths, '--stats', stats, *flags)
+        self.stats = json.loads(stats.read_text())
         self.said, self.remarked = done.stdout, done.stderr
         return done.returncode
 
@@ -82,11 +78,10 @@ class CheckStepTest(unittest.TestCase):
     def test_what_is_not_proved_stays_so_in_later_steps(self):
         lost = sheet(0) + sheet(0.1)
         lost[700] = (float('nan'), 0.0, 0.0)
-        with tempfile.TemporaryDirectory() as folder:
-            files = [pathlib.Path(folder) / ('%d.ply' % k) for k in range(3)]
-            for file, points in zip(files, (lost, *2 * [sheet(0) + sheet(0.1)])):
-                write(file, points, self.FACES)
-            self.assertEqual(subprocess.run([TOOL, *map(str, files)], capture_output=True, text=True).returncode, NOT_PROVED)
+        files = [self.folder / ('%d.ply' % k) for k in range(3)]
+        for file, points in zip(files, (lost, *2 * [sheet(0) + sheet(0.1)])):
+            write(file, points, self.FACES)
+        self.assertEqual(run(TOOL, *files).returncode, NOT_PROVED)
 
     def test_an_edge_through_a_face_at_the_start(self):
         through = [(x, y, 0.3 * (x - 0.111)) for x, y, _ in sheet(0)]
@@ -128,28 +123,27 @@ class CheckStepTest(unittest.TestCase):
             self.assertNotIn('nothing touches', self.said)
 
     def test_errors_are_told_from_what_is_not_proved(self):
-        done = subprocess.run([TOOL, 'nowhere.ply', 'nowhere.ply'], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 1)
-        self.assertEqual(subprocess.run([TOOL, '--no-such-flag'], capture_output=True).returncode, 1)
+        self.assertEqual(run(TOOL, 'nowhere.ply', 'nowhere.ply').returncode, 1)
+        self.assertEqual(run(TOOL, '--no-such-flag').returncode, 1)
 
 
 OBJ_TRIANGLES = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 %(z)s\nv 0.3 0.2 %(z)s\nv 0.2 0.3 %(z)s\n%(faces)s'
 
 
-class Files(unittest.TestCase):
+class Files(FolderTestCase):
     """Steps of two small files, of which the contacts are known."""
 
     TOC = 0.5
 
     def check(self, ending, first, second):
-        with tempfile.TemporaryDirectory() as folder:
-            frames = [pathlib.Path(folder) / (name + ending) for name in '01']
-            for frame, text in zip(frames, (first, second)):
-                frame.write_text(text)
-            csv = pathlib.Path(folder) / 'contacts.csv'
-            done = subprocess.run([TOOL, *map(str, frames), '--contacts', str(csv)], capture_output=True, text=True)
-            self.said, self.remarks = done.stdout, done.stderr.replace(folder + '/', '')
-            rows = csv.read_text().splitlines()[1:] if csv.exists() else []
+        frames = [self.folder / (name + ending) for name in '01']
+        for frame, text in zip(frames, (first, second)):
+            frame.write_text(text)
+        csv = self.folder / 'contacts.csv'
+        csv.unlink(missing_ok=True)
+        done = run(TOOL, *frames, '--contacts', csv)
+        self.said, self.remarks = done.stdout, done.stderr.replace('%s/' % self.folder, '')
+        rows = csv.read_text().splitlines()[1:] if csv.exists() else []
         self.contacts = []
         for row in rows:
             kind, *vertices, lower, upper, certainty = row.split(',')
@@ -235,15 +229,13 @@ class SoupsTest(Files):
     def test_what_is_no_sequence(self):
         self.assertEqual(self.check('.stl', stl(*self.FLOOR), stl(self.FLOOR[0])), 1)
         self.assertIn('1.stl: not the topology of', self.remarks)
-        with tempfile.TemporaryDirectory() as folder:
-            (pathlib.Path(folder) / '0.stl').write_text(stl(*self.FLOOR))
-            write(pathlib.Path(folder) / '1.ply', [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (2, 1, 3)])
-            done = subprocess.run([TOOL, folder + '/0.stl', folder + '/1.ply'], capture_output=True, text=True)
-            self.assertEqual(done.returncode, 1)
-            self.assertIn('write all frames in one format', done.stderr)
+        write(self.folder / '1.ply', [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (2, 1, 3)])
+        done = run(TOOL, self.folder / '0.stl', self.folder / '1.ply')
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('write all frames in one format', done.stderr)
 
 
-class SequenceTest(unittest.TestCase):
+class SequenceTest(FolderTestCase):
     """A sheet that is rolled up, turns, rests and is rolled tighter until its layers meet: more than two frames are steps."""
 
     N = 40
@@ -262,38 +254,35 @@ class SequenceTest(unittest.TestCase):
         return points
 
     def test_each_step_has_the_answer_that_it_has_alone(self):
-        with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
-            for k in range(4):
-                write(folder / ('%d.ply' % k), self.frame(k), faces_of(self.N))
-            frames = [str(folder / ('%d.ply' % k)) for k in self.ORDER]
+        for k in range(4):
+            write(self.folder / ('%d.ply' % k), self.frame(k), faces_of(self.N))
+        frames = [self.folder / ('%d.ply' % k) for k in self.ORDER]
+        csv, json_file = self.folder / 'out.csv', self.folder / 'out.json'
 
-            def run(frames, *flags):
-                done = subprocess.run([TOOL, *frames, '--contacts', str(folder / 'out.csv'), '--stats', str(folder / 'out.json'),
-                                       *flags], capture_output=True, text=True)
-                self.assertEqual(done.stderr, '')
-                return (folder / 'out.csv').read_text(), json.loads((folder / 'out.json').read_text())
+        def answer(frames, *flags):
+            self.assertEqual(run(TOOL, *frames, '--contacts', csv, '--stats', json_file, *flags).stderr, '')
+            return csv.read_text(), json.loads(json_file.read_text())
 
-            kept, stats = run(frames)
-            forgot, without = run(frames, '--forget')
-            self.assertEqual(kept, forgot)
-            self.assertEqual(kept, run(frames, '--threads', '2')[0])
-            self.assertGreater(stats['bodies_kept'], 0)
-            self.assertEqual(without['bodies_kept'], 0)
-            counters = re.findall(r'  COUNTER\((\w+), ', (CHECKOUT / 'include/dccd/outcome.h').read_text())
-            self.assertGreater(len(counters), 10)
-            self.assertLessEqual(set(counters), set(stats))
-            self.assertEqual(stats['steps'], 6)
-            self.assertEqual(set(stats['ms']['total']), {'best', 'median', 'mean'})
-            header, *rows = kept.splitlines()
-            self.assertEqual(header, 'step,kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty')
-            alone = []
-            for k in range(6):
-                first, *of_step = run(frames[k:k + 2])[0].splitlines()
-                self.assertEqual('step,' + first, header)
-                alone += ['%d,%s' % (k, row) for row in of_step]
-            self.assertEqual(rows, alone)
-            self.assertGreater(len(rows), 10)
+        kept, stats = answer(frames)
+        forgot, without = answer(frames, '--forget')
+        self.assertEqual(kept, forgot)
+        self.assertEqual(kept, answer(frames, '--threads', '2')[0])
+        self.assertGreater(stats['bodies_kept'], 0)
+        self.assertEqual(without['bodies_kept'], 0)
+        counters = re.findall(r'  COUNTER\((\w+), ', (CHECKOUT / 'include/dccd/outcome.h').read_text())
+        self.assertGreater(len(counters), 10)
+        self.assertLessEqual(set(counters), set(stats))
+        self.assertEqual(stats['steps'], 6)
+        self.assertEqual(set(stats['ms']['total']), {'best', 'median', 'mean'})
+        header, *rows = kept.splitlines()
+        self.assertEqual(header, 'step,kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty')
+        alone = []
+        for k in range(6):
+            first, *of_step = answer(frames[k:k + 2])[0].splitlines()
+            self.assertEqual('step,' + first, header)
+            alone += ['%d,%s' % (k, row) for row in of_step]
+        self.assertEqual(rows, alone)
+        self.assertGreater(len(rows), 10)
 
     def test_what_touches_in_any_step_is_said(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -308,14 +297,13 @@ class SequenceTest(unittest.TestCase):
             self.assertEqual(json.loads((folder / 'out.json').read_text())['touching'], 'NEW')
 
     def test_a_frame_of_another_mesh_is_named(self):
-        with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
-            for k in range(3):
-                n = self.N if k < 2 else 8
-                write(folder / ('%d.ply' % k), self.frame(k) if k < 2 else sheet(0, 8), faces_of(n))
-            done = subprocess.run([TOOL, *(str(folder / ('%d.ply' % k)) for k in range(3))], capture_output=True, text=True)
-            self.assertEqual(done.returncode, 1)
-            self.assertIn('2.ply: not the topology of', done.stderr)
+        files = [self.folder / name for name in ('0.ply', '1.ply', 'other.ply')]
+        for k, file in enumerate(files):
+            n = self.N if k < 2 else 8
+            write(file, self.frame(k) if k < 2 else sheet(0, 8), faces_of(n))
+        done = run(TOOL, *files)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('other.ply: not the topology of', done.stderr)
 
 
 if __name__ == '__main__':

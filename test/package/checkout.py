@@ -14,6 +14,12 @@ CODE_SUFFIXES = {'.h', '.cpp'}
 sys.path.append(str(CHECKOUT / 'scripts/lib'))  # ros_process
 
 
+def run(*words, **more):
+    """A program with all that it said."""
+    return subprocess.run([str(word) for word in words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          text=True, check=False, **more)
+
+
 class FolderTestCase(unittest.TestCase):
     """With a folder of its own, as long as its tests last."""
 

@@ -9,8 +9,8 @@ import subprocess
 import time
 import unittest
 
-from checkout import TOOLS, FolderTestCase
-from fleet_support import TABLES, make_scene, rows_of, run
+from checkout import TOOLS, FolderTestCase, run
+from fleet_support import TABLES, make_scene, rows_of
 
 LONG = bool(os.environ.get('DEFORMABLE_CCD_LONG'))
 SLURM = '''ClusterName=test
@@ -78,7 +78,7 @@ class SlurmTest(FolderTestCase):
         cls.start('slurmctld', '-D', '-f', config)
         cls.start('slurmd', '-D', '-f', config, '-N', host)
         end = time.time() + 30
-        while run('srun', '-t', '1', 'true', environment={**cls.environment, 'SLURM_WAIT': '1'}).returncode != 0:
+        while run('srun', '-t', '1', 'true', env={**cls.environment, 'SLURM_WAIT': '1'}).returncode != 0:
             if time.time() > end:
                 raise unittest.SkipTest('Slurm does not start here: ' + cls.log()[-600:])
             time.sleep(0.5)
@@ -119,7 +119,7 @@ class SlurmTest(FolderTestCase):
         states = collections.Counter(state for state, in rows_of(out, 'SELECT state FROM recordings'))
         self.assertEqual(sum(states.values()), 12)
         self.assertEqual((states['failed'], states['missing']), (1, 1), (states, text))
-        again = run(*words, environment=self.environment)
+        again = run(*words, env=self.environment)
         states = collections.Counter(state for state, in rows_of(out, 'SELECT state FROM recordings'))
         self.assertEqual((states['failed'], states['missing']), (1, 0), (states, again.stderr))
         whole = self.folder / 'whole'

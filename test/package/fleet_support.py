@@ -1,22 +1,9 @@
 """Scenes, bags and commands for the tests of bags and of fleets."""
 import sqlite3
-import subprocess
 
-import rosbag
-
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, run
 
 TABLES = ('contacts.csv', 'steps.csv', 'patches.csv', 'events.csv')
-
-
-def run(*words, environment=None):
-    return subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False,
-                          env=environment)
-
-
-def messages_of(path):
-    with rosbag.Bag(str(path)) as bag:
-        return list(bag.read_messages())
 
 
 def make_scene(folder, name, scene, *words):
@@ -29,7 +16,7 @@ def make_scene(folder, name, scene, *words):
 
 def fleet(*words, environment=None):
     # By the Python that ROS is installed for, whatever stands first in PATH.
-    return run('/usr/bin/python3', TOOLS / 'analyze_fleet', *words, environment=environment)
+    return run('/usr/bin/python3', TOOLS / 'analyze_fleet', *words, env=environment)
 
 
 def rows_of(out, query):

@@ -1,5 +1,4 @@
 """The fuzzers of decoders build: what of ours their files call is in one of these files. They are built by --long alone."""
-import pathlib
 import re
 import subprocess
 import unittest

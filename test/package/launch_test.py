@@ -13,7 +13,7 @@ import roslaunch
 import roslaunch.arg_dump
 import yaml
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, run
 from ros_process import SLOW, free_port, stop, wait_for
 
 NODE = '/collision_monitor/'
@@ -209,13 +209,11 @@ class LaunchTest(unittest.TestCase):
                 for parameter in ('/collision_monitor', '/use_sim_time'):
                     if master.hasParam(parameter):
                         master.deleteParam(parameter)
-        said = subprocess.run([str(TOOLS / 'analyze_bag'), str(scene), '--report', str(self.home / 'report'), '--quiet'], capture_output=True, text=True, check=True).stdout
-        self.assertIn(default + '\n', said)
+        self.assertIn(default + '\n', run(TOOLS / 'analyze_bag', scene, '--report', self.home / 'report', '--quiet').stdout)
 
     def scene(self):
         scene = self.home / 'scene.bag'
-        subprocess.run([str(TOOLS / 'make_scene_bag'), str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(scene),
-                        '--frames', '2', '--quiet'], check=True, stdin=subprocess.DEVNULL)
+        run(TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', scene, '--frames', 2, '--quiet')
         return scene
 
     def log_of(self, program):

@@ -1,15 +1,12 @@
 """Long work says how far it is: on a terminal a bar with the time that is left, elsewhere plain lines, and nothing of short work."""
 import os
-import pathlib
 import pty
 import re
-import shutil
 import subprocess
-import tempfile
 import threading
 import unittest
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 
 def on_a_terminal(command):
@@ -35,10 +32,8 @@ def on_a_terminal(command):
 
 
 @unittest.skipIf(os.environ.get('DEFORMABLE_CCD_SANITIZED'), "OctoMap's headers say what they write where assertions are on")
-class ProgressTest(unittest.TestCase):
+class ProgressTest(FolderTestCase):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder, True)
         self.record = [TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/rope_through_ring.yaml', self.folder / 'scene.bag']
 
     def test_on_a_terminal_a_bar_with_the_time_that_is_left(self):
@@ -52,8 +47,8 @@ class ProgressTest(unittest.TestCase):
         self.assertEqual(on_a_terminal([*self.record, '--frames', 8000, '--quiet'])[1], '')
 
     def test_short_work_says_nothing(self):
-        ran = subprocess.run([str(c) for c in [*self.record, '--frames', 3]], capture_output=True, text=True, check=True)
-        self.assertEqual(ran.stderr, '')
+        ran = run(*self.record, '--frames', 3)
+        self.assertEqual((ran.returncode, ran.stderr), (0, ''))
 
 
 if __name__ == '__main__':

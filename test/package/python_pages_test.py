@@ -3,14 +3,13 @@ import ast
 import inspect
 import pathlib
 import pydoc
-import subprocess
 import sys
 import unittest
 
 import meshio
 import numpy as np
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, run
 from python_test import FACES, SANITIZED, PythonTestCase, two_triangles
 
 if not SANITIZED:
@@ -94,7 +93,7 @@ class PagesTest(PythonTestCase):
 
 class ExamplesTest(PythonTestCase):
     def run_example(self, name, *arguments):
-        ran = subprocess.run([sys.executable, EXAMPLES / name, *map(str, arguments)], capture_output=True, text=True, check=False)
+        ran = run(sys.executable, EXAMPLES / name, *arguments)
         self.assertEqual((ran.returncode, ran.stderr), (0, ''))
         return ran.stdout.splitlines()
 
@@ -128,10 +127,8 @@ class ExamplesTest(PythonTestCase):
 
     def test_tables_of_a_report(self):
         bag = self.folder / 'scene.bag'
-        subprocess.run([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', bag, '--frames', '45', '--quiet'],
-                       stdout=subprocess.DEVNULL, check=True)
-        subprocess.run([TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet'],
-                       stdout=subprocess.DEVNULL, check=True)
+        run(TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', bag, '--frames', 45, '--quiet')
+        run(TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet')
         lines = self.run_example('read_tables.py', self.folder / 'report')
         self.assertRegex(lines[0], r'^\d+ of \d+ steps are clear$')
         self.assertRegex(lines[-1], r'^mesh +octomap +\d+ +\d+ +\d')

@@ -3,12 +3,11 @@ import csv
 import json
 import re
 import shutil
-import subprocess
 import unittest
 
 import yaml
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 try:
     from selenium import webdriver
@@ -24,10 +23,9 @@ BROWSER = next((b for b in ('chromium', 'chromium-browser', 'google-chrome') if 
 def report(folder, scene, frames, *words):
     """The page of a scene's report."""
     bag, params = folder / 'scene.bag', folder / 'scene.yaml'
-    for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', frames,
-                     '--monitor-config', params, '--quiet'],
+    for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', frames, '--monitor-config', params, '--quiet'],
                     [TOOLS / 'analyze_bag', bag, '--params', params, '--report', folder, '--quiet', *words]):
-        ran = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+        ran = run(*command)
         if ran.returncode not in (0, 3):  # 3: not all of it is proved
             raise RuntimeError(ran.stderr)
     return folder / 'report.html'
@@ -57,9 +55,8 @@ class ReportPageTest(FolderTestCase):
 
     def dom(self):
         """The page as a browser leaves it, and what its console said."""
-        ran = subprocess.run([BROWSER, '--headless', '--no-sandbox', '--disable-gpu', '--enable-logging=stderr', '--v=0',
-                              '--user-data-dir=%s' % (self.own / 'profile'), '--dump-dom', self.page.as_uri()],
-                             capture_output=True, text=True, timeout=120, check=False)
+        ran = run(BROWSER, '--headless', '--no-sandbox', '--disable-gpu', '--enable-logging=stderr', '--v=0',
+                  '--user-data-dir=%s' % (self.own / 'profile'), '--dump-dom', self.page.as_uri(), timeout=120)
         return ran.stdout[:ran.stdout.index('<script')], ran.stderr
 
     def test_loads_nothing(self):

@@ -7,14 +7,13 @@ import re
 import unittest
 
 import genpy
-import rosbag
 from deformable_ccd.msg import ClearanceDistance, Contact
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from visualization_msgs.msg import Marker
 
 from analyze_bag_support import OWN, AnalyzeBagTestCase
+from bag_messages import by_topic, messages_of
 from checkout import CHECKOUT
-from fleet_support import messages_of
 
 
 class ResultsBagTest(AnalyzeBagTestCase):
@@ -23,39 +22,37 @@ class ResultsBagTest(AnalyzeBagTestCase):
         params = self.folder / 'markers.yaml'
         params.write_text('markers: {mesh: true, obstacle_m: 0.3}\nlook_ahead_s: 0.1\n')
         self.analyze('out', self.bag, '--params', params, '-o', out)
-        by_topic = collections.defaultdict(list)
-        for topic, message, _ in messages_of(out):
-            by_topic[topic].append(message)
-        frames = len(by_topic['/cloth'])
+        messages = by_topic(out)
+        frames = len(messages['/cloth'])
         self.assertEqual(frames, sum(topic == '/cloth' for topic, _, _ in self.messages))
         # Beside a step's markers come those of the prediction after it, where it has anything to show.
-        foreseen = sum(any(not c.initial for c in array.contacts) for array in by_topic[OWN + 'predicted_contacts'])
+        foreseen = sum(any(not c.initial for c in array.contacts) for array in messages[OWN + 'predicted_contacts'])
         self.assertGreater(foreseen, 10)
         for name, count in (('contacts', frames), ('first_contact', frames), ('clear', frames), ('stats', frames),
                             ('markers', frames + foreseen), ('predicted_contacts', frames), ('time_to_contact', frames)):
-            self.assertEqual(len(by_topic[OWN + name]), count, name)
-        self.assertEqual([m.answered for m in by_topic[OWN + 'time_to_contact']], [False] + [True] * (frames - 1))
-        listed = sum(len(array.contacts) for array in by_topic[OWN + 'contacts'])
+            self.assertEqual(len(messages[OWN + name]), count, name)
+        self.assertEqual([m.answered for m in messages[OWN + 'time_to_contact']], [False] + [True] * (frames - 1))
+        listed = sum(len(array.contacts) for array in messages[OWN + 'contacts'])
         self.assertEqual(listed, (self.plain / 'contacts.csv').read_text().count('\n') - 1)
         # The last frame with contacts of both kinds: those that the step began with, and new ones.
-        initial = [{c.initial for c in array.contacts} for array in by_topic[OWN + 'contacts']]
+        initial = [{c.initial for c in array.contacts} for array in messages[OWN + 'contacts']]
         both = [i for i, kinds in enumerate(initial) if len(kinds) == 2]
-        steps = [array for array in by_topic[OWN + 'markers'] if array.markers[:1] and array.markers[0].action == Marker.DELETEALL]
+        steps = [array for array in messages[OWN + 'markers'] if array.markers[:1] and array.markers[0].action == Marker.DELETEALL]
         self.assertEqual(len(steps), frames)
         drawn = {marker.ns: marker for marker in steps[both[-1]].markers[1:]}
         self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels', 'began'}, set(drawn))
-        patches = by_topic[OWN + 'patches'][both[-1]].patches
+        patches = messages[OWN + 'patches'][both[-1]].patches
         self.assertEqual(len(drawn['normals'].points), 2 * len(patches), 'one of each patch')
         self.assertEqual(len(drawn['voxels'].points) % 24, 0, 'the twelve edges of each, which hide nothing')
         self.assertEqual(drawn['voxels'].type, Marker.LINE_LIST)
         self.assertRegex(drawn['began'].text, r'^mesh and octomap, \d\.\d\d s ago$')
         self.assertTrue(all(0 < marker.lifetime.to_sec() < 2 for marker in drawn.values()), 'nothing stays of a node that is gone')
-        ahead = {marker.ns: marker for array in by_topic[OWN + 'markers'] for marker in array.markers if array not in steps}
+        ahead = {marker.ns: marker for array in messages[OWN + 'markers'] for marker in array.markers if array not in steps}
         self.assertEqual(set(ahead), {'predicted', 'predicted first'})
         self.assertNotEqual(ahead['predicted'].type, drawn['contacts'].type, 'a style of their own')
         self.assertRegex(ahead['predicted first'].text, r'^mesh and (octomap|itself) in 0\.\d\d s$')
         # What the statistics say beyond the step.
-        stats = by_topic[OWN + 'stats']
+        stats = messages[OWN + 'stats']
         self.assertEqual([s.markers_built for s in stats], list(range(1, frames + 1)))
         self.assertEqual({(s.maps_received, s.maps_refused) for s in stats}, {(1, 0)})
         score = json.loads((self.folder / 'out/report.json').read_text())['look_ahead']
@@ -82,30 +79,26 @@ class ResultsBagTest(AnalyzeBagTestCase):
         params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\neffects: {clearance: on}\n'  # more than the cloth's edges
                           'max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}\n')
         self.analyze('all', self.bag, '--params', params, '-o', out)
-        by_topic = collections.defaultdict(list)
-        for topic, message, _ in messages_of(out):
-            by_topic[topic].append(message)
+        messages = by_topic(out)
         topics = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
                   for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
         self.assertGreater(len(topics), 10)
-        self.assertEqual({OWN + topic for topic in topics} - set(by_topic), set())
-        effects = by_topic[OWN + 'effects']
+        self.assertEqual({OWN + topic for topic in topics} - set(messages), set())
+        effects = messages[OWN + 'effects']
         self.assertEqual({e.name for e in effects[-1].effects if e.running} & {'look_ahead', 'minimum_separation'},
                          {'look_ahead', 'minimum_separation'})
         self.assertLess(len(effects), 10, 'when the plan changes, and not in each step')
         listed = len((self.folder / 'all/left_out.csv').read_text().splitlines()) - 1
-        self.assertEqual(len(by_topic[OWN + 'left_out'][-1].pairs), listed)
+        self.assertEqual(len(messages[OWN + 'left_out'][-1].pairs), listed)
 
     def test_distances_are_zero_exactly_where_something_touches(self):
         out, params = self.folder / 'apart.bag', self.folder / 'apart.yaml'
         params.write_text('effects: {clearance: on}\nclearance: {self_m: 0.1}\nexpected_contacts:\n  - {between: [mesh, self]}\n')
         report = self.analyze('apart', self.bag, '--params', params, '-o', out)
-        by_topic = collections.defaultdict(list)
-        for topic, message, _ in messages_of(out):
-            by_topic[topic].append(message)
+        messages = by_topic(out)
         rows, touched, apart = [], 0, 0
-        self.assertEqual(len(by_topic[OWN + 'clearance']), len(by_topic[OWN + 'contacts']))
-        for contacts, distances, state in zip(*(by_topic[OWN + name] for name in ('contacts', 'clearance', 'state'))):
+        self.assertEqual(len(messages[OWN + 'clearance']), len(messages[OWN + 'contacts']))
+        for contacts, distances, state in zip(*(messages[OWN + name] for name in ('contacts', 'clearance', 'state'))):
             self.assertEqual((distances.header.stamp, distances.answered), (contacts.header.stamp, contacts.answered))
             if not contacts.answered:
                 self.assertEqual((distances.pairs, math.isnan(state.clearance_lower)), ([], True))
@@ -143,16 +136,15 @@ class ResultsBagTest(AnalyzeBagTestCase):
 
     def test_the_bag_of_results_is_diagnosed_once_a_second_of_its_time(self):
         """What a monitor said when the bag was recorded is not in it; what others said is."""
-        slow, out = self.folder / 'slow.bag', self.folder / 'slow_out.bag'
+        out = self.folder / 'slow_out.bag'
         start, own = self.messages[0][2], DiagnosticStatus(name='/collision_monitor: steps', message='of before')
         seconds = 8
         stretch = seconds / (self.messages[-1][2] - start).to_sec()
-        with rosbag.Bag(str(slow), 'w') as bag:
-            for array in ([own, DiagnosticStatus(name='camera')], [own], [DiagnosticStatus(name='arm')]):
-                bag.write('/diagnostics', DiagnosticArray(status=array), start)
-            for topic, message, at in self.messages:
-                bag.write(topic, message, start + genpy.Duration.from_sec((at - start).to_sec() * stretch))
-        self.expect_same(self.analyze('slow', slow, '-o', out))
+        messages = [('/diagnostics', DiagnosticArray(status=array), start)
+                    for array in ([own, DiagnosticStatus(name='camera')], [own], [DiagnosticStatus(name='arm')])]
+        messages += [(topic, message, start + genpy.Duration.from_sec((at - start).to_sec() * stretch))
+                     for topic, message, at in self.messages]
+        self.expect_same(self.analyze('slow', self.write('slow.bag', messages), '-o', out))
         arrays = [(message, at) for topic, message, at in messages_of(out) if topic == '/diagnostics']
         others = [status.name for array, _ in arrays for status in array.status if status.name != own.name]
         self.assertEqual(others, ['camera', 'arm'])
@@ -173,17 +165,12 @@ class ResultsBagTest(AnalyzeBagTestCase):
 
     def test_a_bag_that_was_recorded_beside_monitors(self):
         """As `rosbag record -a` does: their markers, of a mesh type, come before the tracker's topic."""
-        once, recorded, again = (self.folder / name for name in ('once.bag', 'recorded.bag', 'again.bag'))
+        once, again = (self.folder / name for name in ('once.bag', 'again.bag'))
         self.analyze('once', self.bag, '-o', once)
         results = messages_of(once)
-        with rosbag.Bag(str(recorded), 'w') as bag:
-            for own in (OWN, '/guard/'):
-                for topic, message, at in results:
-                    if topic.startswith(OWN):
-                        bag.write(topic.replace(OWN, own), message, at - genpy.Duration(1))
-            for topic, message, at in self.messages:
-                bag.write(topic, message, at)
-        self.expect_same(self.analyze('recorded', recorded, '-o', again))
+        own = [(topic.replace(OWN, own), message, at - genpy.Duration(1)) for own in (OWN, '/guard/')
+               for topic, message, at in results if topic.startswith(OWN)]
+        self.expect_same(self.analyze('recorded', self.write('recorded.bag', own + self.messages), '-o', again))
         # Of diagnostics there is one a second, and the recording is longer.
         count, found = (collections.Counter(topic for topic, _, _ in messages if topic != '/diagnostics')
                         for messages in (results, messages_of(again)))

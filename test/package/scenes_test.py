@@ -7,21 +7,16 @@ import itertools
 import json
 import os
 import re
-import subprocess
 import unittest
 
 import rosbag
 import yaml
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
+from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 from scene_story import StoryContact, StoryEvent, StoryStep, broken_facts, lines, tell, what_met
 
 OBSTACLE = 'octomap'
 RESOLUTION_M, CENTER = 0.02, 1 << 15  # of the demo's map; the key of the coordinate 0
-
-
-def run(*command):
-    return subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
 
 
 @functools.lru_cache(maxsize=None)

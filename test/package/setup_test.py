@@ -92,6 +92,12 @@ class Machine(unittest.TestCase):
         path.write_text('#!/bin/bash\n' + textwrap.dedent(body) + '\n')
         path.chmod(0o755)
 
+    def other_ros(self, distribution='noetic', package='roscpp'):
+        other = self.folder / 'opt/ros' / distribution
+        (other / 'share' / package).mkdir(parents=True)
+        (other / 'share' / package / 'package.xml').touch()
+        return str(other)
+
     def calls(self):
         path = self.state / 'calls'
         return path.read_text().splitlines() if path.exists() else []
@@ -186,20 +192,16 @@ class SetupTest(Machine):
         self.assertEqual(len(self.installing_calls()), 1)
 
     def test_another_ros_is_sourced(self):
-        other = self.folder / 'opt/ros/noetic'
-        (other / 'share/roscpp').mkdir(parents=True)
-        (other / 'share/roscpp/package.xml').touch()
-        for variables in [{'CMAKE_PREFIX_PATH': '/nowhere:%s' % other}, {'ROS_ROOT': '%s/share/ros' % other}]:
-            self.expect_one_line(self.setup_script(**variables), str(other), 'does not mix', 'catkin_make')
+        other = self.other_ros()
+        for variables in [{'CMAKE_PREFIX_PATH': '/nowhere:' + other}, {'ROS_ROOT': other + '/share/ros'}]:
+            self.expect_one_line(self.setup_script(**variables), other, 'does not mix', 'catkin_make')
             # Neither goes the build on when everything happens to be installed.
-            self.expect_one_line(self.setup_script(MISSING='', **variables), str(other))
+            self.expect_one_line(self.setup_script(MISSING='', **variables), other)
         self.assertEqual(self.calls(), [])
 
     def test_ros_2_is_sourced(self):
-        other = self.folder / 'opt/ros/humble'
-        (other / 'share/rclcpp').mkdir(parents=True)
-        (other / 'share/rclcpp/package.xml').touch()
-        self.expect_one_line(self.setup_script(AMENT_PREFIX_PATH=str(other)), str(other), 'does not mix')
+        other = self.other_ros('humble', 'rclcpp')
+        self.expect_one_line(self.setup_script(AMENT_PREFIX_PATH=other), other, 'does not mix')
 
     def test_a_workspace_on_the_systems_ros_is_no_other_ros(self):
         overlay = self.folder / 'catkin_ws/devel'
@@ -285,10 +287,7 @@ class FromSourceTest(Machine):
     def test_another_ros_brings_all_but_these(self):
         self.give_sources()
         self.os_release.write_text(OS_RELEASES['focal'])
-        other = self.folder / 'opt/ros/noetic'
-        (other / 'share/roscpp').mkdir(parents=True)
-        (other / 'share/roscpp/package.xml').touch()
-        ran = self.lacking('--from-source', CMAKE_PREFIX_PATH=str(other))
+        ran = self.lacking('--from-source', CMAKE_PREFIX_PATH=self.other_ros())
         self.assertEqual((ran.returncode, ran.stderr), (0, ''))
         self.assertTrue((self.prefix / 'share/cli11/CMakeLists.txt').exists())
         self.assertEqual(self.installing_calls(), [])

@@ -13,10 +13,8 @@ namespace {
 
 tf2_msgs::TFMessage turned(const std::string& child, double w, double stamp_s, double x = 0,
                            const std::string& parent = "world") {
-  geometry_msgs::TransformStamped one;
+  geometry_msgs::TransformStamped one = above(child, 0, ros::Time(stamp_s));
   one.header.frame_id = parent;
-  one.header.stamp = ros::Time(stamp_s);
-  one.child_frame_id = child;
   one.transform.translation.x = x;
   one.transform.rotation.w = w;
   tf2_msgs::TFMessage message;
@@ -117,9 +115,7 @@ TEST_F(TransformFeedTest, AFrameOnBothTopicsHasNoPlaceUnlessTheyAgree) {
 }
 
 TEST_F(TransformFeedTest, TheReasonOfAFrameWithoutAPlaceNamesThem) {
-  XmlRpcValue tree = scene();
-  tree["transform_timeout_s"] = 0.0;
-  Driven driven(tree);
+  Driven driven(scene("transform_timeout_s: 0.0"));
   driven.feed_tf.add(turned("camera", 1.2, 1), true);
   const Outcome& outcome = driven.feed(1, 0.2f, {}, "camera");
   EXPECT_EQ(outcome.status, StepStatus::NO_TRANSFORM);

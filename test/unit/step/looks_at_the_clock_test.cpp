@@ -3,46 +3,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
-#include "dccd/detect.h"
-#include "dccd/known_space.h"
 #include "support/checkerboard.h"
-#include "support/step_support.h"
+#include "support/looks.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
-constexpr std::int64_t MANY = std::int64_t{1} << 40;
-
-Outcome runFor(std::int64_t looks, const Step& step, const Options& options, History& history) {
-  std::atomic<std::int64_t> left{looks};
-  return detect(step, options, history, Deadline::afterLooks(left));
-}
-
-Outcome runFor(std::int64_t looks, const Step& step, const Options& options) {
-  History history;
-  return runFor(looks, step, options, history);
-}
-
-std::int64_t looksOf(const Step& step, const Options& options) {
-  std::atomic<std::int64_t> left{MANY};
-  History history;
-  detect(step, options, history, Deadline::afterLooks(left));
-  return MANY - left;
-}
-
 Step cloth(std::size_t side, const std::function<Vec3(std::size_t)>& t0, const std::function<Vec3(std::size_t)>& t1) {
-  Body body;
-  body.name = "cloth";
-  body.topology = std::make_shared<const Topology>(Topology::grid(side, side));
   Positions from, to;
   for (std::size_t i = 0; i < side * side; ++i) {
     from.push_back(t0(i));
     to.push_back(t1(i));
   }
-  return stepOf(body, from, to);
+  return stepOf(bodyOf("cloth", Topology::grid(side, side)), from, to);
 }
 
 /// Coordinates from the smallest denormal double to 0.1 m.
@@ -126,17 +104,6 @@ TEST(LooksAtTheClock, BoundsOfALargeMeshAreMadeInPieces) {
   EXPECT_TRUE(again.complete);
   ASSERT_GT(fresh.contacts.size(), 1000u);
   EXPECT_EQ(difference(again.contacts, fresh.contacts), "");
-}
-
-// A budget that is over before the step begins still bounds a small mesh.
-TEST(LooksAtTheClock, ASmallMeshIsBoundedInAnyCase) {
-  TestStep step = crumpled(2, 2, 12);
-  for (Vec3& x : step.bodies[1].t0) x[2] += 8;
-  for (StepBody& body : step.bodies) body.self_collision = false;
-  const Outcome cut = runFor(0, step.motion(), Options());
-  EXPECT_FALSE(cut.complete);
-  EXPECT_GT(cut.earliest_toc, 0.1);
-  EXPECT_LE(cut.earliest_toc, runOnce(step, Options()).earliest_toc);
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "support/closed_meshes.h"
-#include "support/step_support.h"
+#include "support/shapes.h"
 #include "support/step_truth.h"
 
 namespace dccd {
@@ -15,21 +15,6 @@ namespace {
 
 bool meet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
   return segmentMeetsTriangle(p.data(), q.data(), a.data(), b.data(), c.data());
-}
-
-TEST(SegmentTriangle, SimpleCases) {
-  const Vec3 a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
-  EXPECT_TRUE(meet({1, 1, -1}, {1, 1, 1}, a, b, c));
-  EXPECT_FALSE(meet({3, 3, -1}, {3, 3, 1}, a, b, c));
-  EXPECT_FALSE(meet({1, 1, 1}, {1, 1, 2}, a, b, c));
-  EXPECT_TRUE(meet({1, 1, 0}, {1, 1, 2}, a, b, c)) << "touches with its end";
-  EXPECT_TRUE(meet({2, 2, -1}, {2, 2, 1}, a, b, c)) << "through the border";
-  EXPECT_TRUE(meet({4, 0, -1}, {4, 0, 1}, a, b, c)) << "through a corner";
-  EXPECT_TRUE(meet({1, 1, 0}, {1, 2, 0}, a, b, c)) << "in the plane, inside";
-  EXPECT_TRUE(meet({-1, 1, 0}, {9, 1, 0}, a, b, c)) << "in the plane, across";
-  EXPECT_FALSE(meet({3, 3, 0}, {5, 1, 0}, a, b, c)) << "in the plane, outside";
-  EXPECT_TRUE(meet({-1, 0, 0}, {0, 0, 0}, a, b, c)) << "in line with a side, touching";
-  EXPECT_FALSE(meet({-2, 0, 0}, {-1, 0, 0}, a, b, c)) << "in line with a side, apart";
 }
 
 TEST(SegmentTriangle, DegenerateCases) {
@@ -109,9 +94,10 @@ TEST(SegmentTriangle, AgreesWithTheOracleWhereItIsClose) {
 
 const Deadline NO_DEADLINE;
 
-bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
-  return std::equal(x.begin(), x.end(), y.begin(), y.end(),
-                    [](const StartIntersection& a, const StartIntersection& b) { return a == b; });
+std::vector<Contact> contactsOf(const TestStep& step) {
+  std::vector<Contact> contacts;
+  for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
+  return contacts;
 }
 
 struct Scene {
@@ -151,19 +137,6 @@ TEST(StartState, FullTestListsWhatTheOracleLists) {
   EXPECT_GT(found, 200u);
 }
 
-TEST(StartState, FullTestIsTheSameOnEveryTarget) {
-  const Draw draw = drawFrom(8);
-  const TestStep step = randomStep(draw, 60, Coordinates::FEW_BITS);
-  std::vector<std::vector<StartIntersection>> lists;
-  forEachSimdTarget([&](const std::string&) {
-    Scene scene(step);
-    StartStateSearch test;
-    StepStats stats;
-    lists.push_back(test.run(scene.arrays, false, NO_DEADLINE, stats));
-  });
-  for (const auto& list : lists) EXPECT_TRUE(same(list, lists[0]));
-}
-
 // A cloth that comes down on a spike: carried over, only the surroundings of contacts are looked at.
 class FallingCloth : public testing::Test {
  protected:
@@ -180,27 +153,6 @@ class FallingCloth : public testing::Test {
   }
   TestStep step;
 };
-
-TEST_F(FallingCloth, CarriesOver) {
-  Scene scene(step);
-  StartStateSearch test;
-  StepStats stats;
-  EXPECT_TRUE(test.run(scene.arrays, false, NO_DEADLINE, stats).empty());
-  std::vector<Contact> contacts;
-  for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
-  ASSERT_FALSE(contacts.empty());
-  test.remember(scene.arrays, contacts, true);
-
-  const TestStep next = step.continued({step.bodies[0].t1, step.bodies[1].t1});
-  const auto expected = trueIntersections(next);
-  ASSERT_FALSE(expected.empty());
-  scene.record(next);
-  StepStats carried, full;
-  const auto listed = test.run(scene.arrays, true, NO_DEADLINE, carried);
-  EXPECT_TRUE(same(listed, expected)) << listed.size() << " listed, " << expected.size() << " in truth";
-  EXPECT_EQ(test.run(scene.arrays, false, NO_DEADLINE, full).size(), expected.size());
-  EXPECT_LE(carried[Stage::START_STATE].in, full[Stage::START_STATE].in);
-}
 
 TEST_F(FallingCloth, ForgetsWhereItMust) {
   Scene scene(step);
@@ -255,9 +207,7 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
           ASSERT_TRUE(std::any_of(expected.begin(), expected.end(), [&](const auto& x) { return x == one; })) << seed;
         }
       }
-      std::vector<Contact> contacts;
-      for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
-      test.remember(scene.arrays, contacts, true);
+      test.remember(scene.arrays, contactsOf(step), true);
       std::vector<StartIntersection> at_end;
       const bool end_known = test.knowsEnd();
       if (end_known) EXPECT_TRUE(test.listEnd(scene.arrays, NO_DEADLINE, at_end));
@@ -324,9 +274,7 @@ TEST(StartState, WithoutAFirstContactTheEndIsKnown) {
   TestStep step;
   step.bodies = {sheet(6, 6, Vec3::Zero(), 0.25), sheet(6, 6, Vec3(0, 0, 0.1), 0.25)};
   for (std::size_t i = 0; i < 36; ++i) step.bodies[1].t0[i][2] += 0.05 * static_cast<double>(i % 6);  // bounds overlap
-  const Positions low = step.bodies[0].t0, high = step.bodies[1].t0;
-  Positions through = high;
-  for (Vec3& x : through) x[2] -= 0.2;
+  const Positions low = step.bodies[0].t0, high = step.bodies[1].t0, through = movedBy(high, {0, 0, -0.2});
   Options options;
   options.earliest_only = true;
   History history;

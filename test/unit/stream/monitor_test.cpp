@@ -38,20 +38,6 @@ TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
   EXPECT_EQ(partial.stats.unchecked_vertices, 1u);
 }
 
-TEST_F(OneBody, NeverAcrossASeam) {
-  feed(pair(1000 * MS, 1));
-  EXPECT_EQ(feed(pair(2000 * MS, -1)).status, StepStatus::GAP);
-  EXPECT_EQ(feed(pair(500 * MS, 1)).status, StepStatus::TIME_JUMP);
-  EXPECT_EQ(feed(pair(500 * MS, 1)).status, StepStatus::DUPLICATE);
-  MeshFrame other{600 * MS, oneTriangle(), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, false, Eigen::Isometry3d::Identity()};
-  EXPECT_EQ(feed(other).status, StepStatus::TOPOLOGY_CHANGED);
-  other.stamp_ns = 650 * MS;
-  EXPECT_TRUE(assuranceOf(feed(other)).clear()) << "recovered with the second frame";
-  expectAddsUp(monitor);
-  EXPECT_EQ(monitor.total().started(), 4u);
-  EXPECT_EQ(monitor.total().skipped(), 1u);
-}
-
 TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
   feed(pair(0, 1));
   monitor.countReceived(0, 2);
@@ -71,12 +57,6 @@ TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
   EXPECT_EQ(outcome.start_ns, 0);
   EXPECT_EQ(outcome.arrival_ns, 88);
   expectAddsUp(monitor);
-}
-
-TEST_F(OneBody, ResetForgets) {
-  feed(pair(0, 1));
-  monitor.reset();
-  EXPECT_EQ(feed(pair(10 * MS, -1)).status, StepStatus::FIRST_FRAME);
 }
 
 TEST_F(OneBody, TooManyContactsKeepTheEarliest) {

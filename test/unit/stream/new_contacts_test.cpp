@@ -16,14 +16,28 @@ namespace dccd {
 namespace test {
 namespace {
 
+/// These vertices of the first body, or all of them, may lie on the table.
+MonitorOptions expectedOnTheTable(const std::vector<Index>& vertices = {}) {
+  MonitorOptions options;
+  options.detector.expected = {{{ExpectedPartner{0, vertices, ""}, ExpectedPartner{OBSTACLE_BODY, {}, ""}}, ""}};
+  return options;
+}
+
+/// Vertices of a cloth of 5 rows and 21 columns.
+std::vector<Index> columns(Index from, Index to) {
+  std::vector<Index> vertices;
+  for (Index v = 0; v < 5 * 21; ++v) {
+    if (from <= v % 21 && v % 21 < to) vertices.push_back(v);
+  }
+  return vertices;
+}
+
 TEST(NewContacts, APatchIsNewsOnceAndThenLasts) {
-  Stream stream({grid(5, 21)});
-  stream.setMap(table(0.05));
+  ClothOnTable stream(5, 21);
   std::vector<Touching> said;
   for (int k = 0; k < 8; ++k) {
     // One column more touches in every frame: growth.
-    const Outcome outcome = stream.feed(
-        {strip(5, 21, 0.02, [&](std::size_t c) { return k == 0 || static_cast<int>(c) > k ? 0.01 : 0.0; })});
+    const Outcome outcome = stream.lift([&](std::size_t c) { return k == 0 || static_cast<int>(c) > k ? 0.01 : 0.0; });
     said.push_back(assuranceOf(outcome).touching);
     const std::vector<NewContact> found = newContacts(outcome);
     ASSERT_EQ(found.size(), k == 1 ? 1u : 0u) << k;
@@ -70,21 +84,11 @@ TEST(NewContacts, TheEarliestOfEachPairOfPartners) {
 }
 
 TEST(NewContacts, WhatIsExpectedIsNoneUntilItGrowsBeyondThat) {
-  MonitorOptions options;
-  Expectation laid;
-  laid.partners[0].body = 0;
-  for (Index v = 0; v < 5 * 21; ++v) {
-    if (v % 21 < 6) laid.partners[0].vertices.push_back(v);  // the first columns
-  }
-  laid.partners[1].body = OBSTACLE_BODY;
-  options.detector.expected = {laid};
-  Stream stream({grid(5, 21)}, options);
-  stream.setMap(table(0.05));
+  ClothOnTable stream(5, 21, expectedOnTheTable(columns(0, 6)));
   std::vector<std::size_t> news;
   Outcome outcome;
   for (int k = 0; k < 12; ++k) {
-    outcome = stream.feed(
-        {strip(5, 21, 0.02, [&](std::size_t c) { return k == 0 || static_cast<int>(c) > k ? 0.01 : 0.0; })});
+    outcome = stream.lift([&](std::size_t c) { return k == 0 || static_cast<int>(c) > k ? 0.01 : 0.0; });
     news.push_back(newContacts(outcome).size());
     if (k >= 1 && k < 5) EXPECT_EQ(assuranceOf(outcome).touching, Touching::EXPECTED) << k;
     if (k > 7) EXPECT_EQ(assuranceOf(outcome).touching, Touching::LASTING) << k;
@@ -119,27 +123,20 @@ TEST(NewContacts, WhatIsNotExpectedIsRememberedWhereExpectedThingsTouchAsWell) {
 }
 
 TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsOneOnce) {
-  MonitorOptions options;
-  Expectation anywhere;
-  anywhere.partners[1].body = OBSTACLE_BODY;
-  options.detector.expected = {anywhere};
-  Stream stream({grid(5, 5)}, options);
-  stream.setMap(table(0.05));
-  const Positions above = strip(5, 5, 0.02, [](std::size_t) { return 0.01; });
-  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
-  stream.feed({above});
-  for (int k = 0; k < 3; ++k) EXPECT_TRUE(newContacts(stream.feed({resting})).empty());
+  ClothOnTable stream(5, 5, expectedOnTheTable());
+  stream.at(0.01);
+  for (int k = 0; k < 3; ++k) EXPECT_TRUE(newContacts(stream.at(0)).empty());
   stream.expect({});  // the next phase of the task
-  const Outcome outcome = stream.feed({resting});
+  const Outcome outcome = stream.at(0);
   EXPECT_EQ(newContacts(outcome).size(), 1u);
   EXPECT_EQ(earliestNewToc(outcome), 0) << "it touched when the step began";
   EXPECT_EQ(assuranceOf(outcome).touching, Touching::NEW);
   EXPECT_EQ(stream.text(), "BEGAN 1, UNEXPECTED 1");
-  const Outcome after = stream.feed({resting});
+  const Outcome after = stream.at(0);
   EXPECT_TRUE(newContacts(after).empty());
   EXPECT_EQ(assuranceOf(after).touching, Touching::LASTING);
-  for (int k = 0; k < 12; ++k) stream.feed({above});
-  EXPECT_EQ(newContacts(stream.feed({resting})).size(), 1u) << "it comes back";
+  for (int k = 0; k < 12; ++k) stream.at(0.01);
+  EXPECT_EQ(newContacts(stream.at(0)).size(), 1u) << "it comes back";
 }
 
 /// Two triangles that cross as long as the second one's tip is below the first one, and what is expected of them.
@@ -254,20 +251,13 @@ TEST_F(PhasesOfCrossing, WithoutPatchesEveryStepIsAnAlarm) {
 }
 
 TEST(NewContacts, WhatSplitsOrMergesAtTheSwitchIsTold) {
-  MonitorOptions options;
-  Expectation left;  // of a strip of 21 columns the first ones may lie on the table
-  for (Index v = 0; v < 5 * 21; ++v) {
-    if (v % 21 < 8) left.partners[0].vertices.push_back(v);
-  }
-  left.partners[1].body = OBSTACLE_BODY;
-  options.detector.expected = {left};
-  Stream stream({grid(5, 21)}, options);
-  stream.setMap(table(0.05));
+  const MonitorOptions options = expectedOnTheTable(columns(0, 8));
+  ClothOnTable stream(5, 21, options);
   const auto down = [&](const std::vector<std::pair<std::size_t, std::size_t>>& columns) {
-    return stream.feed({strip(5, 21, 0.02, [&](std::size_t c) {
+    return stream.lift([&](std::size_t c) {
       const auto holds = [&](const auto& range) { return range.first <= c && c <= range.second; };
       return std::any_of(columns.begin(), columns.end(), holds) ? 0.0 : 0.01;
-    })});
+    });
   };
   down({});
   EXPECT_TRUE(newContacts(down({{0, 5}})).empty());
@@ -277,12 +267,11 @@ TEST(NewContacts, WhatSplitsOrMergesAtTheSwitchIsTold) {
   EXPECT_NE(stream.text().find("MERGED 1+2"), std::string::npos) << stream.text();
   EXPECT_NE(stream.text().find("UNEXPECTED 1"), std::string::npos) << stream.text();
 
-  Stream other({grid(5, 21)}, options);
+  ClothOnTable other(5, 21, options);
   std::swap(stream, other);
   stream.options().patch_gap_s = 0;
   stream.options().detector.expected[0].partners[0].vertices.clear();
   stream.monitor().setOptions(stream.options());
-  stream.setMap(table(0.05));
   down({});
   EXPECT_TRUE(newContacts(down({{0, 20}})).empty());
   for (int k = 0; k < 2; ++k) EXPECT_TRUE(newContacts(down({{0, 5}, {12, 20}})).empty());
@@ -293,10 +282,7 @@ TEST(NewContacts, WhatSplitsOrMergesAtTheSwitchIsTold) {
 }
 
 TEST(NewContacts, WhatABurstLeavesAtTheSwitchIsTold) {
-  MonitorOptions options;
-  Expectation anywhere;
-  anywhere.partners[1].body = OBSTACLE_BODY;
-  options.detector.expected = {anywhere};
+  MonitorOptions options = expectedOnTheTable();
   options.detector.max_contacts = 1;
   Stream stream({grid(300, 300)}, options);  // more vertices than are remembered in any case
   stream.setMap(table(0.05));
@@ -334,13 +320,11 @@ TEST(NewContacts, OfAPredictionWhatDoesNotLastYet) {
 }
 
 TEST(NewContacts, WithoutPatchesAllThatIsNotExpected) {
-  Stream stream({grid(5, 5)});
-  stream.setMap(table(0.05));
+  ClothOnTable stream(5, 5);
   stream.options().detector.patches = false;
   stream.monitor().setOptions(stream.options());
-  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
-  stream.feed({resting});
-  const Outcome outcome = stream.feed({resting});
+  stream.at(0);
+  const Outcome outcome = stream.at(0);
   EXPECT_EQ(newContacts(outcome).size(), 1u);
   EXPECT_EQ(earliestNewToc(outcome), 0);
 }

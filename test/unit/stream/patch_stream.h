@@ -99,5 +99,26 @@ inline std::shared_ptr<const Topology> grid(std::size_t rows, std::size_t cols) 
   return share(Topology::grid(rows, cols));
 }
 
+/// A cloth, cells of 2 cm, and the table.
+class ClothOnTable : public Stream {
+ public:
+  ClothOnTable(std::size_t rows, std::size_t cols, const MonitorOptions& options = {})
+      : Stream({grid(rows, cols)}, options), rows_(rows), cols_(cols) {
+    setMap(table(0.05));
+  }
+  /// At the heights that its columns have.
+  template <class Height>
+  Outcome lift(const Height& height) {
+    return feed({strip(rows_, cols_, 0.02, height)});
+  }
+  /// All of it at one height.
+  Outcome at(double z) {
+    return lift([z](std::size_t) { return z; });
+  }
+
+ private:
+  std::size_t rows_, cols_;
+};
+
 }  // namespace test
 }  // namespace dccd

@@ -14,16 +14,15 @@ namespace test {
 namespace {
 
 TEST(PatchTracker, AClothLaidDownInTwoPlacesThatGrowTogether) {
-  Stream stream({grid(5, 41)});
-  stream.setMap(table(0.05));
+  ClothOnTable stream(5, 41);
   std::vector<StampNs> stamps;
   std::vector<std::size_t> sizes;
   for (int k = 0; k < 20; ++k) {
-    const Outcome outcome = stream.feed({strip(5, 41, 0.02, [&](std::size_t c) {
+    const Outcome outcome = stream.lift([&](std::size_t c) {
       const double left = std::abs(static_cast<double>(c) - 8) / 12;
       const double right = std::abs(static_cast<double>(c) - 32) / 12 + 0.25;
       return std::max(0.0, 0.01 + 0.05 * std::min(left, right) - 0.004 * k);
-    })});
+    });
     stamps.push_back(stream.now());
     for (const Patch& patch : outcome.patches) EXPECT_NE(patch.id, 0u);
     sizes.push_back(outcome.patches.size());
@@ -140,14 +139,13 @@ TEST(PatchTracker, WhatTouchesASheetFromBothSidesAtOneVertexIsTwo) {
 }
 
 TEST(PatchTracker, ASplitIsToldOnceTheGapIsOverAndTheLargerPartKeepsTheIdentity) {
-  Stream stream({grid(3, 41)});
-  stream.setMap(table(0.05));
+  ClothOnTable stream(3, 41);
   std::vector<std::uint64_t> ids;
   for (int k = 0; k < 40; ++k) {
-    const Outcome outcome = stream.feed({strip(3, 41, 0.02, [&](std::size_t c) {
+    const Outcome outcome = stream.lift([&](std::size_t c) {
       const bool lifted = k >= 10 && c >= 10 && c < 20;
       return k == 0 ? 0.01 : lifted ? 0.05 : 0.0;
-    })});
+    });
     ids.clear();
     for (const Patch& patch : outcome.patches) ids.push_back(patch.id);
     if (k >= 12 && k < 16) {
@@ -185,48 +183,43 @@ TEST(PatchTracker, NoiseOnARestingClothBeginsNothing) {
 }
 
 TEST(PatchTracker, AVoxelThatAppearsUnderARestingCloth) {
-  Stream stream({grid(5, 5)});
-  const Positions x = strip(5, 5, 0.02, [](std::size_t) { return 0.01; });
-  stream.setMap(table(0.05));
-  for (int k = 0; k < 5; ++k) stream.feed({x});
+  ClothOnTable stream(5, 5);
+  for (int k = 0; k < 5; ++k) stream.at(0.01);
   EXPECT_EQ(stream.text(), "");
   std::vector<OccupiedLeaf> leaves = table(0.05)->leaves();
   leaves.push_back({{32768, 32768, 32768}, 1});
   stream.setMap(VoxelSurface::build(0.05, leaves));
-  for (int k = 0; k < 5; ++k) stream.feed({x});
+  for (int k = 0; k < 5; ++k) stream.at(0.01);
   EXPECT_EQ(stream.text(), "BEGAN 1 MAP_CHANGED");
   // The same map once more, and one with other voxels elsewhere.
   stream.setMap(VoxelSurface::build(0.05, leaves));
-  for (int k = 0; k < 5; ++k) stream.feed({x});
+  for (int k = 0; k < 5; ++k) stream.at(0.01);
   leaves.push_back({{32000, 32000, 32000}, 1});
   stream.setMap(VoxelSurface::build(0.05, leaves));
-  for (int k = 0; k < 5; ++k) stream.feed({x});
+  for (int k = 0; k < 5; ++k) stream.at(0.01);
   EXPECT_EQ(stream.text(), "BEGAN 1 MAP_CHANGED");
   // No map at all is no reason for an end as long as one is expected.
   stream.options().detector.obstacle_expected = true;
   stream.monitor().setOptions(stream.options());
   stream.setMap(nullptr);
-  for (int k = 0; k < 15; ++k) stream.feed({x});
+  for (int k = 0; k < 15; ++k) stream.at(0.01);
   stream.setMap(VoxelSurface::build(0.05, leaves));
-  for (int k = 0; k < 15; ++k) stream.feed({x});
+  for (int k = 0; k < 15; ++k) stream.at(0.01);
   EXPECT_EQ(stream.text(), "BEGAN 1 MAP_CHANGED");
 }
 
 TEST(PatchTracker, ASeamEndsAllThatLivesAndWhatTouchesThenIsInitial) {
-  Stream stream({grid(5, 5)});
-  stream.setMap(table(0.05));
-  const Positions above = strip(5, 5, 0.02, [](std::size_t) { return 0.01; });
-  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
-  stream.feed({above});
-  for (int k = 0; k < 5; ++k) stream.feed({resting});
+  ClothOnTable stream(5, 5);
+  stream.at(0.01);
+  for (int k = 0; k < 5; ++k) stream.at(0);
   EXPECT_EQ(stream.text(), "BEGAN 1");
   const StampNs last_ns = stream.now();
   stream.wait(2000000000);
-  const Outcome gap = stream.feed({resting});
+  const Outcome gap = stream.at(0);
   EXPECT_EQ(gap.status, StepStatus::GAP);
   EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1 unknown");
   EXPECT_EQ(stream.events().back().from_ns, last_ns - PERIOD_NS) << "at the beginning of the last step it touched";
-  const Outcome after = stream.feed({resting});
+  const Outcome after = stream.at(0);
   EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1 unknown, BEGAN 2 INITIAL");
   EXPECT_EQ(stream.events().back().from_ns, UNKNOWN_NS);
   EXPECT_EQ(stream.events().back().to_ns, after.start_ns);
@@ -235,8 +228,8 @@ TEST(PatchTracker, ASeamEndsAllThatLivesAndWhatTouchesThenIsInitial) {
   EXPECT_EQ(stream.events().back().patch, 0u);
   // A reset is one as well.
   stream.monitor().reset();
-  stream.feed({resting});
-  stream.feed({resting});
+  stream.at(0);
+  stream.at(0);
   EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1 unknown, BEGAN 2 INITIAL, ENDED 2 unknown, BEGAN 3 INITIAL");
 }
 
@@ -260,20 +253,17 @@ TEST(PatchTracker, ASeamOfOneBodyEndsWhatItTouches) {
 }
 
 TEST(PatchTracker, AStepWithoutAnAnswerOrCutEndsNothing) {
-  Stream stream({grid(9, 9)});
-  stream.setMap(table(0.05));
-  const Positions above = strip(9, 9, 0.02, [](std::size_t) { return 0.01; });
-  const Positions resting = strip(9, 9, 0.02, [](std::size_t) { return 0.0; });
-  stream.feed({above});
-  for (int k = 0; k < 5; ++k) stream.feed({resting});
+  ClothOnTable stream(9, 9);
+  stream.at(0.01);
+  for (int k = 0; k < 5; ++k) stream.at(0);
   const auto run = [&](const std::function<void(Options&)>& change, StepStatus status) {
     const MonitorOptions before = stream.options();
     change(stream.options().detector);
     stream.monitor().setOptions(stream.options());
-    for (int k = 0; k < 20; ++k) EXPECT_EQ(stream.feed({resting}).status, status);
+    for (int k = 0; k < 20; ++k) EXPECT_EQ(stream.at(0).status, status);
     stream.options() = before;
     stream.monitor().setOptions(before);
-    for (int k = 0; k < 3; ++k) EXPECT_EQ(stream.feed({resting}).status, StepStatus::OK);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(stream.at(0).status, StepStatus::OK);
     EXPECT_EQ(stream.text(), "BEGAN 1") << toString(status);
   };
   run([](Options& o) { o.max_found = 1; }, StepStatus::TRUNCATED);
@@ -286,10 +276,10 @@ TEST(PatchTracker, AStepWithoutAnAnswerOrCutEndsNothing) {
     ASSERT_TRUE(stream.monitor().next(0, outcome));
     stream.take(outcome);
   }
-  for (int k = 0; k < 3; ++k) stream.feed({resting});
+  for (int k = 0; k < 3; ++k) stream.at(0);
   EXPECT_EQ(stream.text(), "BEGAN 1");
   // And a whole answer without the contact does.
-  for (int k = 0; k < 12; ++k) stream.feed({above});
+  for (int k = 0; k < 12; ++k) stream.at(0.01);
   EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1");
 }
 
@@ -297,12 +287,9 @@ TEST(PatchTracker, WhatComesBackWithinTheGapIsTheSame) {
   for (const double gap_s : {0.0, 0.1, 1.0}) {
     MonitorOptions options;
     options.patch_gap_s = gap_s;
-    Stream stream({grid(5, 5)}, options);
-    stream.setMap(table(0.05));
+    ClothOnTable stream(5, 5, options);
     // Up for 5 frames, 0.165 s.
-    for (int k = 0; k < 30; ++k) {
-      stream.feed({strip(5, 5, 0.02, [&](std::size_t) { return k == 0 || (k >= 10 && k < 15) ? 0.01 : 0.0; })});
-    }
+    for (int k = 0; k < 30; ++k) stream.at(k == 0 || (k >= 10 && k < 15) ? 0.01 : 0);
     EXPECT_EQ(stream.text(), gap_s > 0.165 ? "BEGAN 1" : "BEGAN 1, ENDED 1, BEGAN 2") << gap_s;
   }
 }
@@ -333,13 +320,11 @@ TEST(PatchTracker, PredictionsAndChecksLeaveItAloneAndKnowWhatLives) {
 }
 
 TEST(PatchTracker, SwitchedOffItForgets) {
-  Stream stream({grid(5, 5)});
-  stream.setMap(table(0.05));
-  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
-  for (int k = 0; k < 3; ++k) stream.feed({resting});
+  ClothOnTable stream(5, 5);
+  for (int k = 0; k < 3; ++k) stream.at(0);
   stream.options().detector.patches = false;
   stream.monitor().setOptions(stream.options());
-  EXPECT_TRUE(stream.feed({resting}).patches.empty());
+  EXPECT_TRUE(stream.at(0).patches.empty());
   EXPECT_EQ(stream.text(), "BEGAN 1 INITIAL, ENDED 1 unknown");
   MonitorOptions bad;
   bad.patch_gap_s = -1;

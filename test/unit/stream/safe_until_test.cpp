@@ -264,9 +264,8 @@ TEST(PromiseWatch, SeesABodyThatWasFasterByOneBit) {
 
 TEST(PromiseWatch, IsExactWhereDoublesOverflowOrVanish) {
   for (const double scale : {1e-250, 1e250}) {
-    const Outcome start = changed(answered({between(0, 1, apart(1))}), [](Step& step) {
-      step.bodies[1].t1 = share(Positions(3, Vec3::Zero()));
-    });
+    const Outcome start = changed(answered({between(0, 1, apart(1))}),
+                                  [](Step& step) { step.bodies[1].t1 = share(Positions(3, Vec3::Zero())); });
     for (const double way_m : {scale, std::nextafter(scale, 1e300)}) {
       PromiseWatch watch;
       watch.setBounds({{0}, {scale}});

@@ -8,6 +8,13 @@ namespace dccd {
 namespace test {
 namespace {
 
+/// The step of both to this stamp.
+Outcome stepOf(Monitor& two, StampNs stamp_ns, double tip_z, double floor_z = 0) {
+  two.push(1, tip(stamp_ns, tip_z), NOW);
+  two.push(0, floor(stamp_ns, floor_z), NOW);
+  return only(two);
+}
+
 class TwoBodies : public ::testing::Test {
  protected:
   Monitor monitor{loose(), {named("floor"), named("tip")}};  // the floor is the clock
@@ -38,13 +45,9 @@ TEST_F(TwoBodies, OthersAreInterpolatedAtBothEnds) {
 TEST_F(TwoBodies, FramesBetweenTheEndsThatLeaveThePathAreNoClearStep) {
   const auto lastOf = [](double middle) {
     Monitor two(loose(), {named("floor"), named("tip")});
-    two.push(1, tip(0, 1), NOW);
-    two.push(0, floor(0, 0), NOW);
-    only(two);
+    stepOf(two, 0, 1);
     two.push(1, tip(50 * MS, middle), NOW);
-    two.push(1, tip(100 * MS, 1), NOW);
-    two.push(0, floor(100 * MS, 0), NOW);
-    return only(two);
+    return stepOf(two, 100 * MS, 1);
   };
   const Outcome straight = lastOf(1.0005);
   EXPECT_EQ(straight.status, StepStatus::OK);
@@ -61,11 +64,7 @@ TEST_F(TwoBodies, AJumpOfAnotherBodyBetweenTwoStepsIsASeam) {
   constexpr StampNs START = 1700000000000 * MS;
   for (const StampNs back_ns : {StampNs{1}, StampNs{10 * MS}, StampNs{100 * MS}, StampNs{5000 * MS}}) {
     Monitor two(loose(), {named("floor"), named("tip")});
-    const auto step = [&](int k, double tip_z) {
-      two.push(1, tip(START + 100 * k * MS, tip_z), NOW);
-      two.push(0, floor(START + 100 * k * MS, 0), NOW);
-      return only(two);
-    };
+    const auto step = [&](int k, double tip_z) { return stepOf(two, START + 100 * k * MS, tip_z); };
     step(0, -1.5);
     EXPECT_TRUE(assuranceOf(step(1, -1.5)).clear()) << "the tip, 1 high, is below";
     two.push(1, tip(START + 100 * MS - back_ns, 1), NOW);

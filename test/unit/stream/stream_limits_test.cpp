@@ -9,24 +9,6 @@ namespace dccd {
 namespace test {
 namespace {
 
-/// What ends a step that has no budget ends it also where frames come as a stream, which makes a deadline of its own.
-TEST(StreamLimits, AStepWithoutABudgetEndsAtMaxCompute) {
-  for (const bool budget : {false, true}) {
-    MonitorOptions options = loose();
-    (budget ? options.detector.step_budget_ms : options.detector.max_compute_ms) = 1e-6;
-    Monitor monitor(options, {named("cloth")});
-    for (const double z : {1.0, -3.0}) {
-      monitor.countReceived(0);
-      monitor.push(0, pair(z > 0 ? 100 * MS : 200 * MS, z), NOW);
-    }
-    Outcome outcome;
-    ASSERT_TRUE(monitor.next(NOW, outcome));
-    ASSERT_TRUE(monitor.next(NOW, outcome));
-    EXPECT_EQ(outcome.status, StepStatus::DEADLINE) << outcome.reason;
-    EXPECT_FALSE(assuranceOf(outcome).proved);
-  }
-}
-
 /// A step and the prediction after it share the time that a step may take.
 TEST(StreamLimits, APredictionHasItsShareOfTheTime) {
   MonitorOptions options = loose();

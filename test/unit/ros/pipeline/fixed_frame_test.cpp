@@ -8,9 +8,7 @@ namespace test {
 namespace {
 
 TEST(FixedFrame, OneThatWasLearntIsLearntAnewAfterAReset) {
-  XmlRpcValue tree;
-  tree["max_vertex_step_m"] = 0.0;
-  Driven learnt(tree);
+  Driven learnt(parameters("max_vertex_step_m: 0.0"));
   learnt.raise("camera", 0.1);
   learnt.giveMap(1);
   learnt.feed(1, 0.25f, {}, "camera");
@@ -22,10 +20,7 @@ TEST(FixedFrame, OneThatWasLearntIsLearntAnewAfterAReset) {
 }
 
 TEST(FixedFrame, OneInWhichNothingWasAnsweredGivesWay) {
-  XmlRpcValue tree;
-  tree["max_vertex_step_m"] = 0.0;
-  tree["transform_timeout_s"] = 0.0;
-  Driven learnt(tree);
+  Driven learnt(parameters("max_vertex_step_m: 0.0, transform_timeout_s: 0.0"));
   learnt.giveMap(1);
   learnt.feed(1, 0.25f, {}, "nowhere");
   EXPECT_EQ(learnt.pipeline.fixedFrame(), "nowhere");

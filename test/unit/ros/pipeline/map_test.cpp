@@ -11,9 +11,7 @@ namespace test {
 namespace {
 
 TEST(Map, OneThatIsNamedIsMissedFromTheFirstStepOn) {
-  XmlRpcValue tree = scene();
-  tree["octomap_topic"] = "/table";
-  Driven named(tree);
+  Driven named(scene("octomap_topic: /table"));
   named.feed(1, 0.35f);
   EXPECT_EQ(named.feed(1.1, 0.34f).status, StepStatus::NO_MAP);
   EXPECT_FALSE(assuranceOf(named.outcome).proved);
@@ -25,9 +23,7 @@ TEST(Map, OneThatIsNamedIsMissedFromTheFirstStepOn) {
 }
 
 TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
-  XmlRpcValue tree = scene();
-  tree["max_map_mb"] = 1;
-  Driven driven(tree);
+  Driven driven(scene("max_map_mb: 1"));
   MapLoader loader(driven.config, driven.feed_tf, [] {});
   const auto take = [&] {
     LoadedMap loaded;

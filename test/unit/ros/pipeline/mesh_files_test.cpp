@@ -1,38 +1,36 @@
-// Bodies and topologies from files: what is missing or no mesh is refused, what is of the wrong size is noticed.
+// Bodies and topologies from files: what is missing or no mesh is refused, what is of the wrong size is noticed, what
+// was skipped is a hint to the user; the lines of an OBJ are ropes over the points that a tracker sends.
 #include <gtest/gtest.h>
 
 #include <array>
 #include <fstream>
 
 #include "dccd/assurance.h"
-#include "support/said.h"
+#include "support/closed_meshes.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
+#include "unit/ros/stl_text.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
-/// A closed box of an STL, 20 x 20 x 40 units, around the origin of the frame `finger` of a rigid body; with a cloth.
-XmlRpcValue clothAndFinger() {
-  const std::string file = ::testing::TempDir() + "finger.stl";
-  std::ofstream stl(file);
-  const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  stl << "solid finger\n";
-  for (const auto& face : faces) {
-    stl << "facet normal 0 0 0\nouter loop\n";
-    for (const int v : face) {
-      stl << "vertex " << (v & 1 ? 10 : -10) << ' ' << (v & 2 ? 10 : -10) << ' ' << (v & 4 ? 40 : 0) << '\n';
-    }
-    stl << "endloop\nendfacet\n";
-  }
-  stl << "endsolid\n";
-  XmlRpcValue tree = scene();
-  tree["effects"]["octomap"] = "off";
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  tree["bodies"]["finger"]["rigid"]["mesh"] = file;
-  tree["bodies"]["finger"]["rigid"]["frame"] = "finger";
-  return tree;
+std::string written(const std::string& name, const std::string& text) {
+  const std::string path = ::testing::TempDir() + name;
+  std::ofstream(path) << text;
+  return path;
+}
+
+/// A cloth and a rigid body of this file in the frame `finger`.
+XmlRpcValue clothAndRigid(const std::string& file) {
+  return scene("effects: {octomap: 'off'}, bodies: {cloth: {topic: cloth}, finger: {rigid: {frame: finger, mesh: '" +
+               file + "'}}}");
+}
+
+/// A closed box of an STL, 20 x 20 x 40 units, around the origin of the frame; with a cloth.
+XmlRpcValue clothAndFinger() { return clothAndRigid(written("finger.stl", stlText(box({-10, -10, 0}, {10, 10, 40})))); }
+
+XmlRpcValue topologyOf(const std::string& file) {
+  return scene("effects: {octomap: 'off'}, topology: {file: '" + file + "'}");
 }
 
 // A file in millimetres makes a finger of 40 m, and no edge of the cloth in it is near a face.
@@ -63,18 +61,14 @@ TEST(Inside, AClothInARigidBodyOfAnStlIsNoClearStart) {
   EXPECT_TRUE(assuranceOf(container.feed(1.1, 0.2f)).clear()) << "a container is meant to hold others";
 }
 
+const char* const POINTS = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0.1 0.1 0\n";
+
 // One rule for files and messages: what cannot be used is missing, and the step is PARTIAL.
 TEST(Files, FacesThatCannotBeUsedAreUnchecked) {
-  const std::string file = ::testing::TempDir() + "with_a_line.obj";
   for (const std::string face : {"", "f 1 4 4\n", "f 1 4 2 3\nf 1 1 4\n", "f 1 2 2\n"}) {
     const bool usable = face.empty() || face == "f 1 2 2\n";
-    std::ofstream(file) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n" << face;
-    XmlRpcValue rigid = clothAndFinger();
-    rigid["bodies"]["finger"]["rigid"]["mesh"] = file;
-    XmlRpcValue topology = scene();
-    topology["effects"]["octomap"] = "off";
-    topology["topology"]["file"] = file;
-    for (const XmlRpcValue& tree : {rigid, topology}) {
+    const std::string file = written("with_a_line.obj", std::string(POINTS) + "f 1 2 3\nf 2 4 3\n" + face);
+    for (const XmlRpcValue& tree : {clothAndRigid(file), topologyOf(file)}) {
       Driven driven(tree);
       driven.raise("finger", -3);
       driven.feed(1, 0.3f);
@@ -102,38 +96,51 @@ std::string errorOf(const XmlRpcValue& tree) {
 }
 
 TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
-  const std::string text_file = ::testing::TempDir() + "no_mesh.stl", ply = ::testing::TempDir() + "square.ply";
-  std::ofstream(text_file) << "this is no mesh\n";
-  std::ofstream(ply)
-      << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-         "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
-         "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n";
-  const auto rigid = [](const std::string& file) {
-    XmlRpcValue tree;
-    tree["bodies"]["cloth"]["topic"] = "cloth";
-    tree["bodies"]["finger"]["rigid"]["mesh"] = file;
-    tree["bodies"]["finger"]["rigid"]["frame"] = "finger";
-    return tree;
-  };
+  const std::string text_file = written("no_mesh.stl", "this is no mesh\n");
+  const std::string ply =
+      written("square.ply",
+              "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+              "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+              "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n");
   const auto names = [](const std::string& error, const std::string& part) {
     EXPECT_NE(error.find(part), std::string::npos) << part << ": " << error;
   };
   for (const std::string& file :
        {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
-    const std::string error = errorOf(rigid(file));
+    const std::string error = errorOf(clothAndRigid(file));
     names(error, "rigid/mesh of body 'finger'");
     names(error, file);
     names(error, "write the path of an STL, OBJ, PLY or DAE mesh");
   }
-  EXPECT_EQ(errorOf(rigid(ply)), "");
-  XmlRpcValue topology;
-  topology["topology"]["file"] = "missing.ply";
-  names(errorOf(topology), "topology/file of body 'mesh': missing.ply");
-  topology["topology"]["file"] = ply;
+  EXPECT_EQ(errorOf(clothAndRigid(ply)), "");
+  names(errorOf(topologyOf("missing.ply")), "topology/file of body 'mesh': missing.ply");
+  XmlRpcValue topology = topologyOf(ply);
   EXPECT_EQ(errorOf(topology), "");
   topology["topology"]["rows"] = 2;
   topology["topology"]["cols"] = 3;
   names(errorOf(topology), "topology/rows of body 'mesh': 2 x 3 = 6, but " + ply + " has 4 points");
+}
+
+TEST(MeshFileRemarks, RopesOfATopologyFile) {
+  Driven ropes(topologyOf(written("ropes.obj", std::string(POINTS) + "l 1 2\nl 3 4\nrope 1 2\n")));
+  ropes.feed(1, 0.3f);
+  const Outcome& outcome = ropes.feed(1.1, 0.2f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_EQ(outcome.step->bodies[0].topology->edges(), (std::vector<Edge>{{0, 1}, {2, 3}}));
+  EXPECT_TRUE(mentions(ropes.pipeline.hint(0),
+                       "ropes.obj: 1 lines with unknown keywords are skipped, the first is 'rope' in line 7"))
+      << ropes.pipeline.hint(0);
+}
+
+TEST(MeshFileRemarks, OfARigidBody) {
+  const auto with = [](const std::string& lines) {
+    return clothAndRigid(written("finger.obj", std::string(POINTS) + lines));
+  };
+  const std::string hint = Driven(with("f 1 2 3\nface 2 3 4\n")).pipeline.hint(1);
+  EXPECT_TRUE(mentions(hint, "finger.obj: 1 lines with unknown keywords are skipped")) << hint;
+  EXPECT_EQ(Driven(with("f 1 2 3\n")).pipeline.hint(1), "");
+  const std::string text = errorOf(with("l 1 2 3\n"));
+  EXPECT_TRUE(mentions(text, "there are no triangles")) << text;
 }
 
 }  // namespace

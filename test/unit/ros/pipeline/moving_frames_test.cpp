@@ -16,31 +16,20 @@ constexpr double START_S = 1.7e9;
 XmlRpcValue clothAndTip() {
   const std::string file = ::testing::TempDir() + "tip.obj";
   std::ofstream(file) << "v 0.2 0.2 0\nv 0.21 0.2 0.05\nv 0.2 0.21 0.05\nf 1 2 3\n";
-  XmlRpcValue tree = scene();
-  tree["effects"]["octomap"] = "off";
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  tree["bodies"]["tip"]["rigid"]["mesh"] = file;
-  tree["bodies"]["tip"]["rigid"]["frame"] = "tip";
-  return tree;
+  return scene("effects: {octomap: 'off'}, bodies: {cloth: {topic: cloth}, tip: {rigid: {frame: tip, mesh: " + file +
+               "}}}");
 }
+
+ros::Time after(double seconds) { return ros::Time(START_S) + ros::Duration(seconds); }
 
 struct Moving : Driven {
   explicit Moving(const XmlRpcValue& tree) : Driven(tree) {}
   void move(const std::string& child, double after_s, double z, double turn = 0) {
-    geometry_msgs::TransformStamped transform;
-    transform.header.stamp = ros::Time(START_S) + ros::Duration(after_s);
-    transform.header.frame_id = "world";
-    transform.child_frame_id = child;
-    transform.transform.translation.z = z;
-    transform.transform.rotation.w = std::cos(turn / 2);
-    transform.transform.rotation.z = std::sin(turn / 2);
-    tf2_msgs::TFMessage message;
-    message.transforms.push_back(transform);
-    feed_tf.add(message, false);
+    tell({above(child, z, after(after_s), turn)});
   }
   /// Whether the frame has its outcome at once.
   bool offer(double after_s, float z, std::int64_t now_ns = 0) {
-    pipeline.take(0, {"sensor_msgs/PointCloud2", cloudAt(ros::Time(START_S) + ros::Duration(after_s), z), 0, now_ns});
+    take(0, cloudAt(after(after_s), z), now_ns);
     return pipeline.nextOutcome(now_ns, outcome);
   }
 };
@@ -93,7 +82,7 @@ TEST(RigidBodies, AreLookedAtOverALongerStepToo) {
   scene.move("tip", 0.06, -0.5);
   scene.offer(0, 0);
   scene.offer(0.05, 0);
-  scene.pipeline.take(0, {"sensor_msgs/PointCloud2", {}, 0, 0});
+  scene.take(0, {});
   EXPECT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
   EXPECT_EQ(scene.outcome.status, StepStatus::BAD_MESSAGE);
   scene.offer(0.15, 0);
@@ -124,7 +113,7 @@ struct Mapped : Moving {
   void giveMapIn(const std::string& frame, double after_s, std::int64_t now_ns = 0) {
     LoadedMap loaded = decodeMapMessage(map(1), config);
     loaded.frame_id = frame;
-    loaded.stamp_ns = static_cast<StampNs>((ros::Time(START_S) + ros::Duration(after_s)).toNSec());
+    loaded.stamp_ns = static_cast<StampNs>(after(after_s).toNSec());
     pipeline.setMap(std::move(loaded), now_ns);
   }
 };
@@ -182,17 +171,11 @@ TEST(Map, WhoseFrameNobodyTellsOfIsNoClearStep) {
 // The cloth's frame is a camera's, from which the fixed frame is learnt; the table's is at rest.
 TEST(StaticBodies, InAFixedFrameThatMovesAreNoClearStep) {
   for (const bool named : {false, true}) {
-    XmlRpcValue tree;
-    if (named) tree = scene();
-    tree["max_vertex_step_m"] = 0.0;
-    tree["effects"]["octomap"] = "off";
-    tree["bodies"]["cloth"]["topic"] = "cloth";
-    tree["bodies"]["table"]["topic"] = "table";
-    tree["bodies"]["table"]["motion"] = "static";
-    Moving scene(tree);
+    const std::string frame = named ? "fixed_frame: world, " : "";
+    Moving scene(parameters(frame + "max_vertex_step_m: 0.0, effects: {octomap: 'off'}, " + CLOTH_AND_TABLE));
     for (int i = 0; i < 6; ++i) scene.move("table", 0.05 * i, i < 3 ? -0.5 : 0.5);
     const std::size_t table = 1;
-    scene.pipeline.take(table, {"sensor_msgs/PointCloud2", cloud(START_S, 0, {}, "table"), 0, 0});
+    scene.take(table, cloud(START_S, 0, {}, "table"));
     for (int i = 0; i < 3; ++i) scene.offer(0.05 * i, 0);
     EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
     scene.offer(0.15, 0);
@@ -201,8 +184,7 @@ TEST(StaticBodies, InAFixedFrameThatMovesAreNoClearStep) {
     EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL);
     EXPECT_NE(scene.outcome.reason.find("the frame of the static body 'table' was seen up to 1 m"), std::string::npos)
         << scene.outcome.reason;
-    scene.pipeline.take(
-        table, {"sensor_msgs/PointCloud2", cloudAt(ros::Time(START_S) + ros::Duration(0.15), 0, "table"), 0, 0});
+    scene.take(table, cloudAt(after(0.15), 0, "table"));
     scene.offer(0.2, 0);
     EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "a frame of now: " << scene.outcome.reason;
   }

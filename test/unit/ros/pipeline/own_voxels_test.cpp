@@ -11,12 +11,11 @@ namespace dccd {
 namespace test {
 namespace {
 
-/// The table of map(), and the voxels in which the cloth of cloud() lies at z = 0.35.
+/// The table, and the voxels in which the cloth of cloud() lies at z = 0.35.
 octomap::OcTree tableAnd(bool cloth) {
-  octomap::OcTree tree(0.1);
+  octomap::OcTree tree = table();
   for (int x = 0; x < 5; ++x) {
     for (int y = 0; y < 5; ++y) {
-      for (int z = -2; z < 2; ++z) tree.updateNode(0.1 * x + 0.05, 0.1 * y + 0.05, 0.1 * z + 0.05, z < 0);
       const bool lies = cloth && x >= 1 && x <= 2 && y >= 1 && y <= 2;
       tree.updateNode(0.1 * x + 0.05, 0.1 * y + 0.05, 0.35, lies);
     }
@@ -24,37 +23,18 @@ octomap::OcTree tableAnd(bool cloth) {
   return tree;
 }
 
-void give(Driven& driven, const octomap::OcTree& tree, double stamp_s) {
-  octomap_msgs::Octomap out;
-  out.header.stamp = ros::Time(stamp_s);
-  out.header.frame_id = "world";
-  out.binary = true;
-  out.id = "OcTree";
-  out.resolution = 0.1;
-  std::ostringstream stream;
-  tree.writeBinaryData(stream);
-  const std::string bytes = stream.str();
-  out.data.assign(bytes.begin(), bytes.end());
-  LoadedMap loaded = decodeMapMessage(bytesOf(out), driven.config);
-  ASSERT_EQ(loaded.problem, "");
-  driven.pipeline.setMap(std::move(loaded), 0);
-}
-
 class OwnVoxelsOfANode : public FolderTest {};
 
 TEST_F(OwnVoxelsOfANode, WithALiveMapAloneTheFirstOneIsInDoubt) {
-  XmlRpcValue tree = scene();
-  tree["own_voxels_m"] = "auto";
-  tree["octomap_topic"] = "/map";
-  Driven driven(tree);
+  Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));
   driven.feed(1, 0.35f);
-  give(driven, tableAnd(true), 1);
+  driven.giveMap(tableAnd(true), 1);
   const Outcome& doubted = driven.feed(1.1, 0.35f);
   EXPECT_EQ(doubted.touching, Touching::NONE);
   EXPECT_NE(describe(assuranceOf(doubted)).find("there in the first map"), std::string::npos);
-  give(driven, tableAnd(false), 1.1);
+  driven.giveMap(tableAnd(false), 1.1);
   EXPECT_TRUE(assuranceOf(driven.feed(1.2, 0.35f)).clear());
-  give(driven, tableAnd(true), 1.2);
+  driven.giveMap(tableAnd(true), 1.2);
   const Outcome& own = driven.feed(1.3, 0.35f);
   EXPECT_TRUE(assuranceOf(own).clear()) << describe(assuranceOf(own));
   EXPECT_EQ(own.step->map.own.own, 4u);
@@ -63,29 +43,23 @@ TEST_F(OwnVoxelsOfANode, WithALiveMapAloneTheFirstOneIsInDoubt) {
 }
 
 TEST_F(OwnVoxelsOfANode, AnEmptyMapHasNotSeenTheTableFree) {
-  XmlRpcValue tree = scene();
-  tree["own_voxels_m"] = "auto";
-  tree["octomap_topic"] = "/map";
-  Driven driven(tree);
+  Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));
   driven.feed(1, 0.35f);
-  give(driven, tableAnd(false), 1);
+  driven.giveMap(tableAnd(false), 1);
   driven.feed(1.1, 0.35f);
-  give(driven, octomap::OcTree(0.1), 1.1);
+  driven.giveMap(octomap::OcTree(0.1), 1.1);
   driven.feed(1.2, 0.35f);
   driven.feed(1.3, 0.05f);
-  give(driven, tableAnd(false), 1.3);
+  driven.giveMap(tableAnd(false), 1.3);
   const Outcome& near = driven.feed(1.4, 0.05f);
   EXPECT_TRUE(assuranceOf(near).clear()) << describe(assuranceOf(near));
   EXPECT_EQ(driven.feed(1.5, -0.05f).touching, Touching::NEW) << "it was there before the cloth came";
 }
 
 TEST_F(OwnVoxelsOfANode, MapsOfACellWithoutTheBodyCountAlsoBeforeItsFirstFrame) {
-  XmlRpcValue tree = scene();
-  tree["own_voxels_m"] = "auto";
-  tree["octomap_topic"] = "/map";
-  Driven driven(tree);
-  give(driven, tableAnd(false), 0.8);
-  give(driven, tableAnd(true), 1);
+  Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));
+  driven.giveMap(tableAnd(false), 0.8);
+  driven.giveMap(tableAnd(true), 1);
   driven.feed(1, 0.35f);
   const Outcome& outcome = driven.feed(1.1, 0.35f);
   EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
@@ -94,25 +68,17 @@ TEST_F(OwnVoxelsOfANode, MapsOfACellWithoutTheBodyCountAlsoBeforeItsFirstFrame) 
 
 TEST_F(OwnVoxelsOfANode, WithAMapFileBesideNothingIsInDoubtThatLiesThere) {
   const std::string file = (folder_ / "table.bt").string();
-  octomap::OcTree table = tableAnd(false);
-  ASSERT_TRUE(table.writeBinary(file));
-  XmlRpcValue tree = scene();
-  tree["own_voxels_m"] = 0.2;
-  tree["octomap_topic"] = "/map";
-  tree["octomap_file"] = file;
-  Driven driven(tree);
+  ASSERT_TRUE(tableAnd(false).writeBinary(file));
+  Driven driven(scene("own_voxels_m: 0.2, octomap_topic: /map, octomap_file: " + file));
   driven.pipeline.setMap(loadMapFile(file, driven.config), 0);
   driven.feed(1, 0.15f);
   EXPECT_EQ(driven.feed(1.1, 0.15f).status, StepStatus::NO_MAP) << "the live one is missed";
-  give(driven, tableAnd(false), 1.1);
+  driven.giveMap(tableAnd(false), 1.1);
   const Outcome& near = driven.feed(1.2, 0.15f);
   EXPECT_TRUE(assuranceOf(near).clear()) << "the table is within reach, but trusted: " << describe(assuranceOf(near));
   EXPECT_EQ(driven.feed(1.3, -0.05f).touching, Touching::NEW);
   // The file alone is a map as before.
-  XmlRpcValue alone = scene();
-  alone["own_voxels_m"] = 0.2;
-  alone["octomap_file"] = file;
-  Driven single(alone);
+  Driven single(scene("own_voxels_m: 0.2, octomap_file: " + file));
   single.pipeline.setMap(loadMapFile(file, single.config), 0);
   single.feed(1, 0.15f);
   EXPECT_TRUE(assuranceOf(single.feed(1.1, 0.15f)).clear());
@@ -120,13 +86,10 @@ TEST_F(OwnVoxelsOfANode, WithAMapFileBesideNothingIsInDoubtThatLiesThere) {
 }
 
 TEST_F(OwnVoxelsOfANode, AMapFileBesideThatCannotBeReadIsNoMap) {
-  XmlRpcValue tree = scene();
-  tree["octomap_topic"] = "/map";
-  tree["octomap_file"] = "/nowhere/table.bt";
-  Driven driven(tree);
+  Driven driven(scene("octomap_topic: /map, octomap_file: /nowhere/table.bt"));
   driven.pipeline.setMap(loadMapFile("/nowhere/table.bt", driven.config), 0);
   driven.feed(1, 0.35f);
-  give(driven, tableAnd(false), 1);
+  driven.giveMap(tableAnd(false), 1);
   const Outcome& outcome = driven.feed(1.1, 0.35f);
   EXPECT_EQ(outcome.status, StepStatus::NO_MAP);
   EXPECT_NE(outcome.reason.find("/nowhere/table.bt"), std::string::npos) << outcome.reason;

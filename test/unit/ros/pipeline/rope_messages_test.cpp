@@ -113,7 +113,7 @@ TEST(RowStep, WrongOnesAreCountedAndSaidOnce) {
   for (const double stamp_s : {1.1, 1.2}) {
     std::vector<std::uint8_t> bytes = cloud(stamp_s, 0.1f);
     std::memcpy(&bytes[bytes.size() - 1 - 64 - 4 - 4], &wrong, sizeof wrong);
-    cloth.pipeline.take(0, {"sensor_msgs/PointCloud2", bytes, 0, 0});
+    cloth.take(0, bytes);
     ASSERT_TRUE(cloth.pipeline.nextOutcome(0, cloth.outcome));
     EXPECT_EQ(cloth.outcome.status, StepStatus::OK) << "the step goes on: " << cloth.outcome.reason;
   }

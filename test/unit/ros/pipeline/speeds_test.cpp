@@ -7,7 +7,6 @@
 #include "dccd/assurance.h"
 #include "output/output_messages.h"
 #include "output/safe_until_messages.h"
-#include "unit/ros/parameter_support.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -80,9 +79,7 @@ TEST(SpeedParameters, MistakesAreNamed) {
 
 // A fall onto the map's top at z = 0, seen at the same height in two frames: between them it may have been lower.
 TEST(PathsBetweenFrames, ATouchThatNobodySawIsReportedWhereTheAccelerationAllowsIt) {
-  XmlRpcValue tree = scene();
-  tree["max_acceleration_m_s2"] = 8.0;  // 8 * 0.1^2 / 8 = 0.01 m in 0.1 s
-  Driven cloth(tree);
+  Driven cloth(scene("max_acceleration_m_s2: 8"));  // 8 * 0.1^2 / 8 = 0.01 m in 0.1 s
   cloth.giveMap(1);
   EXPECT_TRUE(cloth.pipeline.effects().plan().running(Effect::TRACKER_NOISE));
   cloth.feed(1, 0.011f);
@@ -102,19 +99,13 @@ TEST(PathsBetweenFrames, ATouchThatNobodySawIsReportedWhereTheAccelerationAllows
 }
 
 TEST(PathsBetweenFrames, ABodyThatIsNotTheClockHasTheStepsToleranceBesides) {
-  XmlRpcValue tree;
-  tree["max_acceleration_m_s2"] = 8.0;
-  tree["effects"]["octomap"] = "off";
-  tree["fixed_frame"] = "world";
-  tree["clock_body"] = "a";
-  tree["bodies"]["a"]["topic"] = "a";
-  tree["bodies"]["b"]["topic"] = "b";
-  tree["bodies"]["b"]["uncertainty"]["radius_m"] = 0.5;
-  Driven both(tree);
+  Driven both(
+      scene("max_acceleration_m_s2: 8, effects: {octomap: 'off'}, clock_body: a, "
+            "bodies: {a: {topic: a}, b: {topic: b, uncertainty: {radius_m: 0.5}}}"));
   Outcome outcome;
   for (const double stamp_s : {1.0, 1.1}) {
-    both.pipeline.take(1, {"sensor_msgs/PointCloud2", cloud(stamp_s, 2), 0, 0});
-    both.pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, 0), 0, 0});
+    both.take(1, cloud(stamp_s, 2));
+    both.take(0, cloud(stamp_s, 0));
     while (both.pipeline.nextOutcome(0, outcome)) {
     }
   }

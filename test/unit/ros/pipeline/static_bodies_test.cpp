@@ -12,19 +12,9 @@ constexpr std::int64_t SECOND_NS = 1000000000;
 
 /// A cloth in the world over a static table in a frame of its own, whose transform is not there.
 struct Tabled : Driven {
-  Tabled() : Driven(bodies()) {}
-  static XmlRpcValue bodies() {
-    XmlRpcValue tree;
-    tree["max_vertex_step_m"] = 0.0;
-    tree["effects"]["octomap"] = "off";
-    tree["bodies"]["cloth"]["topic"] = "cloth";
-    tree["bodies"]["table"]["topic"] = "table";
-    tree["bodies"]["table"]["motion"] = "static";
-    return tree;
-  }
+  Tabled() : Driven(parameters("max_vertex_step_m: 0.0, effects: {octomap: 'off'}, " + std::string(CLOTH_AND_TABLE))) {}
   void take(std::size_t body, double stamp_s, float z, std::int64_t now_ns) {
-    pipeline.take(body,
-                  {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
+    Driven::take(body, cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), now_ns);
   }
   const FrameCounters& tables() const { return pipeline.monitor().counters(TABLE); }
   static constexpr std::size_t CLOTH = 0, TABLE = 1;
@@ -103,7 +93,7 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
 
   const auto moved = cloud(2, 0, {}, "lorry");
-  scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, SECOND_NS});
+  scene.Driven::take(Tabled::TABLE, moved, SECOND_NS);
   EXPECT_FALSE(feed(0.3f, SECOND_NS)) << "waits with the table's frame, as long as that may wait";
   ASSERT_TRUE(scene.pipeline.nextOutcome(2 * SECOND_NS, scene.outcome));
   EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
@@ -114,7 +104,7 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   EXPECT_FALSE(now.answered);
   EXPECT_EQ(now.status, StepStatus::NO_BODY);
   EXPECT_EQ(now.reason, scene.outcome.reason);
-  scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, 3 * SECOND_NS});
+  scene.Driven::take(Tabled::TABLE, moved, 3 * SECOND_NS);
   ASSERT_TRUE(feed(0.3f, 3 * SECOND_NS)) << "what comes in a frame that is known to be missing holds nothing up again";
   EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
 

@@ -12,10 +12,7 @@ namespace test {
 namespace {
 
 TEST(TrackerNoise, ComesFromThePointField) {
-  XmlRpcValue tree = scene();
-  tree["uncertainty"]["field"] = "sigma";
-  tree["uncertainty"]["scale"] = 3.0;
-  Driven noisy(tree);
+  Driven noisy(scene("uncertainty: {field: sigma, scale: 3}"));
   noisy.giveMap(1);
   EXPECT_TRUE(noisy.pipeline.effects().plan().running(Effect::TRACKER_NOISE));
   noisy.feed(1, 0.17f, {0, 0, 0, 0});
@@ -38,9 +35,7 @@ TEST(TrackerNoise, ComesFromThePointField) {
 }
 
 TEST(TrackerNoise, BadFieldsAreRefusedByNameAndValue) {
-  XmlRpcValue tree = scene();
-  tree["uncertainty"]["field"] = "sigma";
-  Driven noisy(tree);
+  Driven noisy(scene("uncertainty: {field: sigma}"));
   EXPECT_EQ(noisy.feed(1, 0.2f).status, StepStatus::BAD_MESSAGE);
   EXPECT_NE(noisy.outcome.reason.find("'sigma'"), std::string::npos) << noisy.outcome.reason;
   EXPECT_EQ(noisy.feed(1.1, 0.2f, {0, -1, 0, 0}).status, StepStatus::BAD_MESSAGE);
@@ -53,9 +48,7 @@ TEST(TrackerNoise, BadFieldsAreRefusedByNameAndValue) {
 }
 
 TEST(TrackerNoise, ANumberHoldsForAllVertices) {
-  XmlRpcValue tree = scene();
-  tree["uncertainty"]["radius_m"] = 0.12;
-  Driven noisy(tree);
+  Driven noisy(scene("uncertainty: {radius_m: 0.12}"));
   noisy.giveMap(1);
   noisy.feed(1, 0.17f);
   EXPECT_NEAR(noisy.feed(1.1, 0.07f).earliest_toc, 0.5, 1e-3);

@@ -26,9 +26,7 @@ TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
 }
 
 TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
-  XmlRpcValue tree = scene();
-  tree["unknown_space"] = "report";
-  Driven report(tree);
+  Driven report(scene("unknown_space: report"));
   report.giveMap(1);
   report.feed(1, 0.35f);
   // Swept: 2 x 2 columns of voxels, z from 0.1 to 0.4; the upper two of three are unknown.
@@ -43,16 +41,13 @@ TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
 }
 
 TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
-  XmlRpcValue tree = scene();
-  tree["unknown_space"] = "report";
-  tree["max_step_s"] = 10.0;
-  Driven report(tree);
+  Driven report(scene("unknown_space: report, max_step_s: 10"));
   report.giveMap(1);
   const auto spread = [&](double stamp_s, float reach) {
     auto bytes = cloud(stamp_s, 0.35f);
     const float far[3] = {reach, reach, reach};
     std::memcpy(bytes.data() + bytes.size() - 1 - 16, far, sizeof far);  // the last point; is_dense follows
-    report.pipeline.take(0, {"sensor_msgs/PointCloud2", bytes, 0, 0});
+    report.take(0, bytes);
     EXPECT_TRUE(report.pipeline.nextOutcome(0, report.outcome));
   };
   spread(1, 0.5f);
@@ -66,16 +61,13 @@ TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
 }
 
 TEST(UnknownSpace, MaskedVerticesSweepNothing) {
-  XmlRpcValue tree = scene();
-  tree["unknown_space"] = "report";
-  tree["vertex_mask"][0] = 0;  // of the two triangles of the grid one is left, or none
-  Driven masked(tree);
+  // Of the two triangles of the grid one is left, or none.
+  Driven masked(scene("unknown_space: report, vertex_mask: [0]"));
   masked.giveMap(1);
   masked.feed(1, 0.35f);
   const std::uint64_t some = masked.feed(1.1, 0.15f).stats[Effect::UNKNOWN_SPACE].in;
   EXPECT_LE(some, 12u);
-  for (int v = 0; v < 4; ++v) tree["vertex_mask"][v] = v;
-  Driven all(tree);
+  Driven all(scene("unknown_space: report, vertex_mask: [0, 1, 2, 3]"));
   all.giveMap(1);
   all.feed(1, 0.35f);
   EXPECT_EQ(all.feed(1.1, 0.15f).stats[Effect::UNKNOWN_SPACE].in, 0u);
@@ -83,14 +75,9 @@ TEST(UnknownSpace, MaskedVerticesSweepNothing) {
 }
 
 TEST(UnknownSpace, TheShareIsThatOfAllBodies) {
-  XmlRpcValue tree = scene();
-  tree["unknown_space"] = "report";
-  tree["bodies"]["cloth"]["topic"] = "cloth";
-  tree["bodies"]["table"]["topic"] = "table";
-  tree["bodies"]["table"]["motion"] = "static";
-  Driven two(tree);
+  Driven two(scene("unknown_space: report, " + std::string(CLOTH_AND_TABLE)));
   two.giveMap(1);
-  two.pipeline.take(1, {"sensor_msgs/PointCloud2", cloud(1, 0.05f), 0, 0});  // in voxels that are known
+  two.take(1, cloud(1, 0.05f));  // in voxels that are known
   two.feed(1, 0.35f);
   const Outcome& outcome = two.feed(1.1, 0.15f);
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 12u + 4u) << outcome.reason;
@@ -98,11 +85,7 @@ TEST(UnknownSpace, TheShareIsThatOfAllBodies) {
 }
 
 TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
-  XmlRpcValue tree = scene();
-  tree["unknown_space"] = "occupied";
-  const double box[6] = {0, 0, 0, 0.5, 0.5, 0.6};
-  for (int i = 0; i < 6; ++i) tree["unknown_box"][i] = box[i];
-  Driven occupied(tree);
+  Driven occupied(scene("unknown_space: occupied, unknown_box: [0, 0, 0, 0.5, 0.5, 0.6]"));
   occupied.giveMap(1);
   occupied.feed(1, 0.12f);
   const Outcome& outcome = occupied.feed(1.1, 0.28f);

@@ -1,14 +1,12 @@
 // What a robot takes into its hand and lets go of: requests and their mistakes, and what becomes of the body.
-#include <tf2_msgs/TFMessage.h>
-
 #include <fstream>
 
 #include "node/attach_request.h"
 #include "record/step_replay.h"
+#include "robot_scene.h"
 #include "robot_texts.h"
 #include "support/folder_test.h"
-#include "unit/ros/parameter_support.h"
-#include "unit/ros/pipeline/driven_pipeline.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -18,18 +16,7 @@ using Request = deformable_ccd::AttachObject::Request;
 
 /// A hand of a palm with a plate 1 m x 1 m x 2 mm, and a frame without geometry.
 RobotLoader hand() {
-  return [](const RobotConfig& config, double tolerance_m) {
-    const std::string plate = collision("<box size='1 1 0.002'/>");
-    return robotFrom(robotOf(link("palm", plate) + link("tool", "") + joint("palm", "tool")), "", config, tolerance_m);
-  };
-}
-
-XmlRpcValue handScene() {
-  XmlRpcValue tree = scene();
-  tree["effects"]["octomap"] = "off";
-  tree["transform_timeout_s"] = 0.0;
-  tree["robot"]["description"] = "robot_description";
-  return tree;
+  return loads(robotOf(link("palm", collision("<box size='1 1 0.002'/>")) + link("tool", "") + joint("palm", "tool")));
 }
 
 /// 1 m x 1 m x 2 mm, 0.5 m above the frame of the tool.
@@ -46,36 +33,22 @@ Request plate(const std::string& name = "plate") {
 
 class Attached : public FolderTest {
  protected:
-  void start(const XmlRpcValue& tree = handScene()) { driven_ = std::make_unique<Driven>(tree, hand()); }
+  void start(const XmlRpcValue& tree = robotScene()) { driven_ = std::make_unique<Driven>(tree, hand()); }
   void attach(const Request& request) { pipeline().attach(readAttach(request, pipeline().config())); }
   std::string refusal(const Request& request) {
-    try {
-      attach(request);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "";
+    return test::said<std::exception>([&] { attach(request); });
   }
   /// The palm far below, the tool at this height; then a frame of the cloth.
   const Outcome& feed(double stamp_s, double tool_z, float cloth_z) {
-    tf2_msgs::TFMessage message;
-    for (const auto& [child, z] : {std::pair("palm", -9.0), std::pair("tool", tool_z)}) {
-      geometry_msgs::TransformStamped& one = message.transforms.emplace_back();
-      one.header.frame_id = "world";
-      one.header.stamp = ros::Time(stamp_s);
-      one.child_frame_id = child;
-      one.transform.translation.z = z;
-      one.transform.rotation.w = 1;
-    }
-    driven_->feed_tf.add(message, false);
+    const ros::Time stamp(stamp_s);
+    driven_->tell({above("palm", -9, stamp), above("tool", tool_z, stamp)});
     return driven_->feed(stamp_s, cloth_z);
   }
   Assurance said() const { return assuranceOf(driven_->outcome); }
   /// Voxels of 0.1 m: far away, at (0.05, 0.05, 0.25), and so many beside each other in the plane z = 0.35.
-  void giveMap(double stamp_s, std::uint16_t count) {
-    std::vector<OccupiedLeaf> leaves{{{32868, 32868, 32868}, 1}, {{32768, 32768, 32770}, 1}};
-    for (std::uint16_t i = 0; i < count; ++i)
-      leaves.push_back({{static_cast<std::uint16_t>(32768 + i), 32768, 32771}, 1});
+  void giveMap(double stamp_s, int count) {
+    std::vector<OccupiedLeaf> leaves = voxelsOfBox({0, 0, 3}, {count, 1, 4});
+    leaves.insert(leaves.end(), {voxelAt(100, 100, 100), voxelAt(0, 0, 2)});
     LoadedMap loaded;
     loaded.surface = VoxelSurface::build(0.1, std::move(leaves));
     loaded.stamp_ns = static_cast<StampNs>(stamp_s * 1e9);
@@ -88,9 +61,7 @@ class Attached : public FolderTest {
 };
 
 TEST_F(Attached, ItMovesWithItsLinkAndStaysWhereItIsLetGo) {
-  XmlRpcValue tree = handScene();
-  tree["patch_gap_s"] = 0.0;  // each touch is news
-  start(tree);
+  start(robotScene("", "effects: {octomap: 'off'}, patch_gap_s: 0.0"));  // each touch is news
   feed(1, 0, 0.8f);
   ASSERT_TRUE((feed(1.1, 0, 0.8f), said().clear())) << said().missing.front();
   attach(plate());
@@ -141,9 +112,7 @@ TEST_F(Attached, ARecordedStepHasTheBodiesOfThatStep) {
 }
 
 TEST_F(Attached, ContactWithItsLinkIsExpectedWhereLinksMeet) {
-  XmlRpcValue tree = handScene();
-  tree["robot"]["against_links"] = true;
-  start(tree);
+  start(robotScene("against_links: true"));
   Request request = plate();
   request.link = "palm";
   request.pose.position.z = 0.3;
@@ -169,9 +138,7 @@ TEST_F(Attached, ContactWithItsLinkIsExpectedWhereLinksMeet) {
 }
 
 TEST_F(Attached, PaddingHoldsForItToo) {
-  XmlRpcValue tree = handScene();
-  tree["robot"]["padding_m"] = 0.05;
-  start(tree);
+  start(robotScene("padding_m: 0.05"));
   feed(1, 0, 0.8f);
   attach(plate());
   feed(1.1, 0, 0.552f);
@@ -204,9 +171,7 @@ TEST_F(Attached, WithoutATransformTheStateIsUnprovedAndNamesIt) {
 
 // What a map first shows where it is, is its own; what was an obstacle before stays one.
 TEST_F(Attached, ItsVoxelsAreItsOwnUntilItIsRemoved) {
-  XmlRpcValue tree = handScene();
-  tree["effects"]["octomap"] = "auto";
-  start(tree);
+  start(robotScene("", "effects: {octomap: auto}"));
   giveMap(0.9, 0);
   feed(1, -0.15, 0.8f);
   feed(1.1, -0.15, 0.8f);
@@ -228,10 +193,7 @@ TEST_F(Attached, ItsVoxelsAreItsOwnUntilItIsRemoved) {
 
 // A mesh in millimetres, or a frame that is elsewhere, could cut anything out of the map.
 TEST_F(Attached, WhereMoreVoxelsAreOwnThanMayBeNothingIsProved) {
-  XmlRpcValue tree = handScene();
-  tree["effects"]["octomap"] = "auto";
-  tree["robot"]["max_own_voxels"] = 2;
-  start(tree);
+  start(robotScene("max_own_voxels: 2", "effects: {octomap: auto}"));
   giveMap(0.9, 0);
   attach(plate());
   for (const double at : {1.0, 1.1, 1.2}) feed(at, -0.15, 0.8f);

@@ -5,7 +5,9 @@
 #include <fstream>
 
 #include "robot_texts.h"
+#include "support/closed_meshes.h"
 #include "support/folder_test.h"
+#include "unit/ros/stl_text.h"
 
 namespace dccd {
 namespace test {
@@ -39,14 +41,7 @@ class RobotModel : public FolderTest {
   }
   /// A tetrahedron whose corners are the origin and 1, 2, 3 along the axes.
   std::string tetrahedron(const std::string& name) {
-    const std::string corners[4] = {"0 0 0", "1 0 0", "0 2 0", "0 0 3"};
-    std::string text = "solid t\n";
-    for (const auto& f : {std::array<int, 3>{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}) {
-      text += "facet normal 0 0 0\nouter loop\n";
-      for (const int c : f) text += "vertex " + corners[c] + "\n";
-      text += "endloop\nendfacet\n";
-    }
-    return write(name, text + "endsolid t\n");
+    return write(name, stlText(test::tetrahedron({0, 0, 0}, {0, 2, 0}, {1, 0, 0}, {0, 0, 3})));
   }
 };
 
@@ -169,31 +164,26 @@ TEST_F(RobotModel, AVisualStandsForACollisionElement) {
 }
 
 TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {
-  struct Case {
-    const char* geometry;
-    const char* expected;
-  };
   const std::string flat = write("flat.stl", "solid t\nendsolid t\n");
-  const std::string empty = "<mesh filename='" + flat + "'/>";
-  const Case cases[] = {
+  const std::pair<std::string, const char*> cases[] = {
       {"<mesh filename='package://no_such_package/a.stl'/>", "there is no package 'no_such_package'"},
       {"<mesh filename='/no/such/file.stl'/>", "/no/such/file.stl"},
-      {empty.c_str(), "flat.stl"},
+      {"<mesh filename='" + flat + "'/>", "flat.stl"},
       {"<mesh filename='/a.stl' scale='1 0 1'/>", "the scale of its mesh /a.stl is 0"},
       {"<box size='1 0 1'/>", "a side of its box is 0 m; it must be above 0"},
       {"<cylinder radius='-1' length='1'/>", "the radius of its cylinder is -1 m"},
       {"<sphere radius='0'/>", "the radius of its sphere is 0 m"},
       {"<cone radius='1'/>", "is <cone>, which is no geometry"},
   };
-  for (const Case& one : cases) {
-    const Robot robot = robotFrom(robotOf(link("bad", collision(one.geometry)) +
+  for (const auto& [geometry, expected] : cases) {
+    const Robot robot = robotFrom(robotOf(link("bad", collision(geometry)) +
                                           link("good", collision("<box size='1 1 1'/>")) + joint("good", "bad")));
     EXPECT_TRUE(robot.known);
-    ASSERT_EQ(robot.parts.size(), 1u) << one.geometry;
+    ASSERT_EQ(robot.parts.size(), 1u) << geometry;
     EXPECT_EQ(robot.parts[0].name, "good");
-    ASSERT_EQ(robot.missing.size(), 1u) << one.geometry;
+    ASSERT_EQ(robot.missing.size(), 1u) << geometry;
     EXPECT_TRUE(says(robot.missing, "link 'bad'")) << robot.missing[0];
-    EXPECT_TRUE(says(robot.missing, one.expected)) << robot.missing[0];
+    EXPECT_TRUE(says(robot.missing, expected)) << robot.missing[0];
   }
 }
 

@@ -22,10 +22,6 @@ const char SRDF[] =
     "<group name='both'><link name='arm'/><link name='palm'/></group>"
     "<disable_collisions link1='palm' link2='arm'/></robot>";
 
-RobotLoader loads(const std::string& urdf, const std::string& srdf = "") {
-  return [=](const RobotConfig& config, double tolerance_m) { return robotFrom(urdf, srdf, config, tolerance_m); };
-}
-
 MonitorConfig read(const std::string& yaml, const std::string& urdf = armAndHand(), const std::string& srdf = SRDF) {
   return readConfig(parseYaml(yaml, "p.yaml"), "", loads(urdf, srdf));
 }

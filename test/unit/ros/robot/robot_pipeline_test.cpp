@@ -1,11 +1,9 @@
 // A robot's links beside a cloth: placed by tf, against independent kinematics, with links that are missing or lost.
-#include <tf2_msgs/TFMessage.h>
-
 #include <random>
 
 #include "panda.h"
+#include "robot_scene.h"
 #include "robot_texts.h"
-#include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
 namespace test {
@@ -17,33 +15,12 @@ std::string plates() {
   return robotOf(link("palm", plate) + link("thumb", plate) + joint("palm", "thumb"));
 }
 
-RobotLoader loads(const std::string& urdf, const std::string& srdf = "") {
-  return [=](const RobotConfig& config, double tolerance_m) { return robotFrom(urdf, srdf, config, tolerance_m); };
-}
-
-XmlRpcValue robotScene() {
-  XmlRpcValue tree = scene();
-  tree["effects"]["octomap"] = "off";
-  tree["transform_timeout_s"] = 0.0;
-  tree["robot"]["description"] = "robot_description";
-  return tree;
-}
-
 class RobotPipeline : public ::testing::Test {
  protected:
   void start(const XmlRpcValue& tree, const std::string& urdf = plates(), const std::string& srdf = "") {
     driven_ = std::make_unique<Driven>(tree, loads(urdf, srdf));
   }
-  void put(const std::string& child, double stamp_s, double z) {
-    tf2_msgs::TFMessage message;
-    geometry_msgs::TransformStamped& one = message.transforms.emplace_back();
-    one.header.frame_id = "world";
-    one.header.stamp = ros::Time(stamp_s);
-    one.child_frame_id = child;
-    one.transform.translation.z = z;
-    one.transform.rotation.w = 1;
-    driven_->feed_tf.add(message, false);
-  }
+  void put(const std::string& child, double stamp_s, double z) { driven_->tell({above(child, z, ros::Time(stamp_s))}); }
   /// The outcome of a cloth's frame.
   const Outcome& feed(double stamp_s, float z) { return driven_->feed(stamp_s, z); }
   bool unproved(const std::string& part) { return says(driven_->outcome.unproved, part); }
@@ -70,27 +47,9 @@ TEST_F(RobotPipeline, ALinkIsABodyThatTfCarries) {
   EXPECT_TRUE(says(outcome.excluded, "links of the robot against each other"));
 }
 
-TEST_F(RobotPipeline, WhatAGroupMayTouchIsExpected) {
-  XmlRpcValue tree = robotScene();
-  tree["robot"]["semantic"] = "robot_description_semantic";
-  tree["expected_contacts"][0]["between"][0] = "mesh";
-  tree["expected_contacts"][0]["between"][1] = "group hand";
-  start(tree, plates(), robotOf("<group name='hand'><chain base_link='palm' tip_link='thumb'/></group>"));
-  for (const double at : {1.0, 1.1}) {
-    put("palm", at, 0.1);
-    put("thumb", at, -1);
-  }
-  feed(1, 0.3f);
-  feed(1.1, 0.05f);
-  EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::EXPECTED);
-  EXPECT_TRUE(assuranceOf(driven_->outcome).proved);
-}
-
 // As long as the hand is closed; once it is open, what touches is news, though it touched before.
 TEST_F(RobotPipeline, WhatTheHandHoldsIsExpectedUntilItOpens) {
-  XmlRpcValue tree = robotScene();
-  tree["robot"]["holds"]["mesh"] = "palm";
-  start(tree);
+  start(robotScene("holds: {mesh: palm}"));
   for (const double at : {1.0, 1.1, 1.2, 1.3}) {
     put("palm", at, 0.1);
     put("thumb", at, -1);
@@ -150,9 +109,7 @@ TEST_F(RobotPipeline, ALateTransformIsWaitedFor) {
   XmlRpcValue tree = robotScene();
   tree["transform_timeout_s"] = 0.2;
   start(tree);
-  const auto take = [&](double stamp_s, std::int64_t now_ns) {
-    driven_->pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, 0.3f), now_ns, now_ns});
-  };
+  const auto take = [&](double stamp_s, std::int64_t now_ns) { driven_->take(0, cloud(stamp_s, 0.3f), now_ns); };
   Outcome& outcome = driven_->outcome;
   for (const double at : {1.0, 1.1}) put("palm", at, 0.1);
   put("thumb", 1.0, 0.1);
@@ -182,19 +139,6 @@ TEST_F(RobotPipeline, WhatOfItCouldNotBeReadIsNotVouchedFor) {
     EXPECT_TRUE(unproved(expected)) << joinedText(driven_->outcome.unproved);
     EXPECT_TRUE(says(driven_->pipeline.checkNow().unproved, expected));
   }
-}
-
-TEST_F(RobotPipeline, PaddingIsADistanceThatIsHeldExactly) {
-  XmlRpcValue tree = robotScene();
-  tree["robot"]["padding_m"] = 0.05;
-  start(tree);
-  for (const double at : {1.0, 1.1, 1.2}) {
-    put("palm", at, 0.099);
-    put("thumb", at, 0.099);
-  }
-  feed(1, 0.3f);
-  EXPECT_TRUE(assuranceOf(feed(1.1, 0.151f)).clear()) << "0.051 m above";
-  EXPECT_FALSE(feed(1.2, 0.149f).contacts.empty());
 }
 
 // KDL reads the URDF by itself and multiplies its own frames. Each joint goes to tf as robot_state_publisher would send

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string>
 
+#include "config/monitor_config.h"
 #include "robot/robot_model.h"
 
 namespace dccd {
@@ -29,6 +30,11 @@ inline std::string joint(const std::string& parent, const std::string& child, co
 inline Robot robotFrom(const std::string& urdf, const std::string& srdf = "", const RobotConfig& config = {},
                        double tolerance_m = 1e-3) {
   return makeRobot({"test.urdf", urdf, ""}, {srdf.empty() ? "" : "test.srdf", srdf, ""}, config, tolerance_m);
+}
+
+/// What reads this robot, whatever the parameters name.
+inline RobotLoader loads(const std::string& urdf, const std::string& srdf = "") {
+  return [=](const RobotConfig& config, double tolerance_m) { return robotFrom(urdf, srdf, config, tolerance_m); };
 }
 
 inline const RobotPart& partOf(const Robot& robot, const std::string& name) {

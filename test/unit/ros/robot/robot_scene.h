@@ -1,0 +1,16 @@
+// The parameters of a cloth beside a robot.
+#pragma once
+
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+
+/// YAML of what stands under `robot`, and of the rest. Nothing waits for a transform.
+inline XmlRpcValue robotScene(const std::string& of_robot = "", const std::string& more = "effects: {octomap: 'off'}") {
+  const std::string robot = "description: robot_description" + (of_robot.empty() ? "" : ", " + of_robot);
+  return scene("transform_timeout_s: 0.0, robot: {" + robot + "}, " + more);
+}
+
+}  // namespace test
+}  // namespace dccd
