@@ -237,7 +237,10 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
     while (at != NO_INDEX && all_.spots[at].vertex[1] != spot.across) at = before_[at];
     if (at == NO_INDEX) {
       at = static_cast<std::uint32_t>(all_.spots.size());
-      all_.push({{spot.vertex, spot.across}, outcome.patches[spot.patch].body}, Known());
+      TouchGraph::Spot& one = all_.spots.emplace_back();
+      one.vertex = {spot.vertex, spot.across};
+      one.body = outcome.patches[spot.patch].body;
+      all_.known.emplace_back();
       before_.push_back(std::exchange(last_at_[spot.vertex], at));
       current_.push_back(NO_PATCH);
     }
@@ -271,9 +274,16 @@ bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) con
 }
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
+  releaseBurst(part_of_);
+  releaseBurst(parts_);
+  if (outcome.patches.empty()) {  // of what does not touch nobody asks what belongs together
+    graph_.clear();               // what a burst made of it is given back
+    parts_.assign(1, Part());
+    part_of_.assign(all_.spots.size(), 0);
+    return;
+  }
   // Where all that touched still does, the patches of the step are the parts.
   const bool same = all_.spots.size() == found.spots().size();
-  releaseBurst(part_of_);
   if (same) {
     part_of_ = current_;
   } else {
@@ -285,7 +295,6 @@ void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
       part_of_.insert(part_of_.end(), last - first, part);
     });
   }
-  releaseBurst(parts_);
   parts_.assign(same ? outcome.patches.size() : graph_.patchCount(), Part());
   part_of_patch_.assign(outcome.patches.size(), 0);
   for (std::size_t i = 0; i < current_.size(); ++i) {
@@ -384,25 +393,31 @@ void PatchTracker::begin(Outcome& outcome) {
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   alive_.clear();
   for (auto& [id, living] : living_) living.unexpected = false;
+  std::uint64_t unexpected_id = 0;  // the last one that was told so
   std::size_t kept = 0;
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    TouchGraph::Spot& spot = all_.spots[i];
-    Known& known = all_.known[i];
+    const TouchGraph::Spot& spot = all_.spots[i];
+    // Numbers, not the whole: a copy of what was just written in parts would wait for it.
+    std::uint64_t id = all_.known[i].id;
+    std::int64_t last_ns = all_.known[i].last_ns;
+    bool expected = spot.expected;
     const std::int64_t clock_ns = spot.body[1] == OBSTACLE_BODY ? map_clock_ns_ : mesh_clock_ns_;
-    if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
-    if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) continue;
+    if (current_[i] != NO_PATCH) last_ns = clock_ns;
+    if (static_cast<double>(clock_ns - last_ns) > gap_s * 1e9) continue;
     Part& part = parts_[part_of_[i]];
     if (part.touches) {
-      known.id = part.id;
+      id = part.id;
       // All of it is expected now: what was not, when other things were expected, is over.
-      if (expectsOtherwise() && !part.isUnexpected()) spot.expected = true;
-      part.lasts_unexpected = part.lasts_unexpected || !spot.expected;
+      expected = expected || (expectsOtherwise() && !part.isUnexpected());
+      part.lasts_unexpected = part.lasts_unexpected || !expected;
     } else {
-      if (alive_.empty() || alive_.back() != known.id) alive_.push_back(known.id);
-      if (!spot.expected) living_.at(known.id).unexpected = true;
+      if (alive_.empty() || alive_.back() != id) alive_.push_back(id);
+      if (!expected && id != unexpected_id) living_.at(unexpected_id = id).unexpected = true;
     }
-    all_.spots[kept] = spot;
-    all_.known[kept++] = known;
+    if (kept != i) all_.spots[kept] = spot;
+    all_.spots[kept].expected = expected;
+    all_.known[kept].id = id;
+    all_.known[kept++].last_ns = last_ns;
   }
   all_.resize(kept);
   std::swap(all_, trace_);

@@ -54,7 +54,8 @@ const Contact* endOfAlike(const Contact* first, const Contact* last) {
 }
 template <class T>
 const T* endOfAlike(const T* first, const T* last) {
-  return std::find_if(first, last, [&](const T& one) { return one.body != first->body; });
+  const std::uint16_t low = first->body[0], high = first->body[1];  // as numbers: arrays are compared by a function
+  return std::find_if(first, last, [&](const T& one) { return one.body[0] != low || one.body[1] != high; });
 }
 
 /// Where there is one piece alone, which most steps have, nothing is made for threads.
