@@ -29,6 +29,9 @@ class YamlTree {
     if (depth > MAX_DEPTH || ++values_ > MAX_VALUES) {
       fail(node, "nests too deeply or repeats itself; write it without anchors");
     }
+    const std::string& tag = node.Tag();  // "!" is that of quotes, "?" and none those of all else
+    if (tag.size() > 1)
+      fail(node, "the value has the tag " + tag + ", which is not read here; write the value without it");
     ParameterTree tree = node.IsScalar() ? scalar(node) : ParameterTree();
     tree.line = node.Mark().line + 1;
     if (node.IsSequence()) {

@@ -115,7 +115,8 @@ class SrdfReader {
     return found;
   }
 
-  /// From the base to the tip; where that does not hang from the base, over the nearest link from which both hang.
+  /// From the base to the tip, as MoveIt has it: without the base where the tip hangs from it, since no joint of the
+  /// chain moves it; else over the nearest link from which both hang.
   std::vector<std::string> chain(const XMLElement& element) {
     const std::string base = neededText(element, "base_link"), tip = neededText(element, "tip_link");
     if (!isLink(base, element) || !isLink(tip, element)) return {};
@@ -124,6 +125,7 @@ class SrdfReader {
       links.pop_back();
       other.pop_back();
     }
+    if (links.size() == 1 && other.size() > 1) links.clear();
     links.insert(links.end(), other.rbegin() + 1, other.rend());  // both end with the same
     return links;
   }

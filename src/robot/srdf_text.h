@@ -18,10 +18,10 @@ struct SrdfText {
   std::vector<std::string> remarks;  ///< on what names a link or joint that the robot has not, and is left out
 };
 
-/// A group holds the links that it names, those of its chains from base to tip (which may lead over a link from which
-/// both hang), the child of each of its joints, and those of the groups that it names. States, virtual and passive
-/// joints and what else there is are not read. Throws RobotTextError: no XML, an attribute is missing, a group that is
-/// unknown, named twice, or holds itself.
+/// A group holds the links that it names, those of its chains as MoveIt has them (from the link after the base to the
+/// tip, or over a link from which both hang), the child of each of its joints, and those of the groups that it names.
+/// States, virtual and passive joints and what else there is are not read. Throws RobotTextError: no XML, an attribute
+/// is missing, a group that is unknown, named twice, or holds itself.
 SrdfText parseSrdf(const std::string& text, const urdf::ModelInterface& model);
 
 }  // namespace dccd

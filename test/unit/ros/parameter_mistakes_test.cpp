@@ -39,6 +39,10 @@ TEST(Parameters, WhatAFileSaysInVainIsRefused) {
             "FILE:4: cloth stands twice");
   EXPECT_EQ(errorIn("topic: /cloth\n---\nmax_step_s: 0.1\n"),
             "FILE: holds several documents; write one, without a line ---");
+  EXPECT_EQ(errorIn("topic: /cloth\nmax_step_s: !degrees 90\n"),
+            "FILE:2: the value has the tag !degrees, which is not read here; write the value without it");
+  EXPECT_EQ(errorIn("topic: !!str cloth\n"),
+            "FILE:1: the value has the tag tag:yaml.org,2002:str, which is not read here; write the value without it");
   EXPECT_FALSE(parseYaml("# nothing\n", "FILE").isSet());
   EXPECT_EQ(parseYaml("---\ntopic: /cloth\n", "FILE").members.at("topic").text, "/cloth");
 }
