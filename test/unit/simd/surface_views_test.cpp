@@ -5,6 +5,7 @@
 #include <hwy/aligned_allocator.h>
 
 #include <array>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -34,7 +35,7 @@ int normalAlong(const int (&line)[3], const Whole& a, const Whole& b, const Whol
 // 0, and only there. The one in the middle comes from the face as it is at t = 1/2, here twice as large.
 TEST(SurfaceViews, AFaceIsFacedWhereItsNormalPointsThereAllTheStep) {
   constexpr std::size_t GROUPS = 200, FACES = GROUPS * simd::GROUP;
-  Random random(5);
+  std::mt19937_64 random(5);
   const auto positions = hwy::AllocateAligned<double>(FACES * 3 * 8);
   std::vector<Whole> at[2];
   for (std::size_t v = 0; v < FACES * 3; ++v) {
