@@ -155,7 +155,7 @@ TEST_F(RobotPipeline, ThePandasLinksAreWhereKdlHasThem) {
   const Robot& robot = driven_->config.robot;
   EXPECT_EQ(joinedText(robot.missing), "");
   EXPECT_EQ(robot.parts.size(), 11u);
-  EXPECT_EQ(robot.groups.at("panda_arm").size(), 9u);
+  EXPECT_EQ(robot.groups.at("panda_arm").size(), 8u);
   std::mt19937 random(7);
   std::uniform_real_distribution<double> angle(-2.5, 2.5);
   std::map<std::string, KDL::Frame> before;
