@@ -107,7 +107,7 @@ struct Run {
     contacts.clear();
     sum = StepStats();
     earliest_toc = std::numeric_limits<double>::infinity();
-    Touching touching = Touching::NONE;
+    Touching touching = Touching::NONE;  // nothing is expected here, so that the largest is the worst
     if (steps.size() > 1) history.clear();
     for (const Step& step : steps) {
       result = detect(step, options, history);

@@ -168,6 +168,10 @@ void MeshDecoder::takeFixed(std::size_t points, std::size_t grid_rows, std::size
     mismatch("topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
              std::to_string(rows * cols));
   }
+  if (grid_rows > 1 && grid_cols > 1 && rows != grid_rows) {  // else a line after the other, of whatever shape
+    mismatch("in " + std::to_string(grid_rows) + " rows of " + std::to_string(grid_cols) +
+             ", and topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols));
+  }
   if (rows >= 2 && cols >= 2) checkFaces(2 * (rows - 1) * (cols - 1));
   // Two corners of no polygon stand for the grid's shape.
   const Polygons shape{{static_cast<Index>(rows), static_cast<Index>(cols)}, {}};

@@ -144,6 +144,19 @@ TEST(MeshDecoder, OneTriangleIsNotTheGridBeforeIt) {
   EXPECT_EQ(decode(decoder, mesh(points, {{2, 8, 0}})).topology->faces().size(), 1u);
 }
 
+// Its triangles would join points that are far apart.
+TEST(MeshDecoder, ACloudInRowsIsNoGridOfAnotherShape) {
+  Positions points;
+  for (int k = 0; k < 12; ++k) points.push_back({k / 4 * 1.0, k % 4 * 1.0, 0});
+  sensor_msgs::PointCloud2 cloud = test::cloud(points, 5);
+  EXPECT_EQ(errorOf(grid(4, 3), cloud), "") << "in one row it may have any";
+  cloud.height = 3;
+  cloud.width = 4;
+  cloud.row_step = cloud.width * cloud.point_step;
+  EXPECT_EQ(errorOf(grid(3, 4), cloud), "");
+  EXPECT_EQ(errorOf(grid(4, 3), cloud), "12 points, but in 3 rows of 4, and topology/rows x topology/cols is 4 x 3");
+}
+
 TEST(MeshDecoder, RefusesOtherTypesAndWhatIsTooMuch) {
   EXPECT_TRUE(
       mentions(test::said<MeshError>([] { MeshDecoder({}).decode("std_msgs/String", {}); }), "std_msgs/String"));
