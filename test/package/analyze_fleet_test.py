@@ -37,7 +37,7 @@ class FleetTest(FolderTestCase):
 
     def test_what_comes_out(self):
         self.assertEqual(self.ran.returncode, 4, self.ran.stderr)
-        self.assertRegex(self.ran.stderr, r'(?m)^analyze_fleet: corrupt: .*read')
+        self.assertRegex(self.ran.stderr, r'(?m)^analyze_fleet: corrupt: .*cut or damaged')
         self.assertRegex(self.ran.stderr, r'\d+ of \d+ jobs, about \d+:\d\d:\d\d left')
         states = dict(rows_of(self.out, 'SELECT name, state FROM recordings'))
         self.assertEqual(set(states), {'first', 'second', 'corrupt'})

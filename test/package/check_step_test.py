@@ -285,16 +285,14 @@ class SequenceTest(FolderTestCase):
         self.assertGreater(len(rows), 10)
 
     def test_what_touches_in_any_step_is_said(self):
-        with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
-            for k, z in enumerate((1, 1, -1, -2)):
-                (folder / ('%d.obj' % k)).write_text(OBJ_TRIANGLES % {'z': z, 'faces': 'f 1 2 3\nf 4 5 6\n'})
-            done = subprocess.run([TOOL, *(str(folder / ('%d.obj' % k)) for k in range(4)), '--stats', str(folder / 'out.json')],
-                                  capture_output=True, text=True)
-            self.assertEqual(done.returncode, 0)
-            self.assertIn('exact: proved, something touches anew\n', done.stdout)
-            self.assertEqual(done.stdout.splitlines()[1].split()[:4], ['exact', '3', '0', '1.5'])
-            self.assertEqual(json.loads((folder / 'out.json').read_text())['touching'], 'NEW')
+        frames = [self.folder / ('%d.obj' % k) for k in range(4)]
+        for path, z in zip(frames, (1, 1, -1, -2)):
+            path.write_text(OBJ_TRIANGLES % {'z': z, 'faces': 'f 1 2 3\nf 4 5 6\n'})
+        done = run(TOOL, *frames, '--stats', self.folder / 'out.json')
+        self.assertEqual(done.returncode, 0)
+        self.assertIn('exact: proved, something touches anew\n', done.stdout)
+        self.assertEqual(done.stdout.splitlines()[1].split()[:4], ['exact', '3', '0', '1.5'])
+        self.assertEqual(json.loads((self.folder / 'out.json').read_text())['touching'], 'NEW')
 
     def test_a_frame_of_another_mesh_is_named(self):
         files = [self.folder / name for name in ('0.ply', '1.ply', 'other.ply')]
