@@ -11,8 +11,10 @@ if(OCTOMAP_SOURCES)
 endif()
 
 # --- the node: what comes in, its options, what goes out, and the class that holds them ---------------------------------
+file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 file(GLOB ROS_SOURCES CONFIGURE_DEPENDS
-  src/input/*.cpp src/input/message_types/*.cpp src/config/*.cpp src/robot/*.cpp src/output/*.cpp src/node/*.cpp)
+  src/input/*.cpp src/config/*.cpp src/robot/*.cpp src/output/*.cpp src/node/*.cpp)
+list(APPEND ROS_SOURCES ${MESSAGE_TYPES})
 list(APPEND ROS_LINK_LIBRARIES deformable_ccd ${catkin_LIBRARIES} yaml-cpp)
 if(ROS_SOURCES)
   add_library(deformable_ccd_ros SHARED ${ROS_SOURCES})
@@ -21,6 +23,8 @@ if(ROS_SOURCES)
   target_include_directories(deformable_ccd_ros SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS}
     ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
   target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> ${COMMON_HEADERS})
+  set_target_properties(deformable_ccd_ros PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
+  set_source_files_properties(${MESSAGE_TYPES} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)  # their names are the same
   target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb PRIVATE deformable_ccd_report)
   # PCL's headers are the slowest to read: only for the files that use them. The compiler's own folders must not come
   # with them, since their order matters to it.
@@ -56,6 +60,7 @@ foreach(source ${APP_SOURCES})
   add_dependencies(${app} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
   target_include_directories(${app} PRIVATE src)
   target_compile_options(${app} PRIVATE ${COLD_CODE})
+  set_target_properties(${app} PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
   target_include_directories(${app} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
   if(app STREQUAL "make_scene_bag")
     target_include_directories(${app} SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})

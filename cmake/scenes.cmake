@@ -24,6 +24,7 @@ if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURC
     add_library(deformable_ccd_physics STATIC ${PHYSICS_SOURCES})
     target_include_directories(deformable_ccd_physics PUBLIC src)
     target_compile_options(deformable_ccd_physics PRIVATE ${COLD_CODE})
+    set_target_properties(deformable_ccd_physics PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
     # Bullet's headers raise warnings of their own under -Wextra.
     target_include_directories(deformable_ccd_physics SYSTEM PRIVATE ${BULLET_DOUBLE_INCLUDE_DIRS})
     target_link_libraries(deformable_ccd_physics PUBLIC deformable_ccd_headers deformable_ccd_parameters PRIVATE PkgConfig::BULLET_DOUBLE)

@@ -40,6 +40,7 @@ if(nlohmann_json_FOUND)
   target_link_libraries(deformable_ccd_report PUBLIC deformable_ccd_headers nlohmann_json::nlohmann_json)
   target_precompile_headers(deformable_ccd_report PRIVATE <nlohmann/json.hpp> ${COMMON_HEADERS})
   target_compile_options(deformable_ccd_report PRIVATE ${COLD_CODE})
+  set_target_properties(deformable_ccd_report PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
 endif()
 
 set(CORE_TOOLS replay_step)

@@ -16,7 +16,7 @@ constexpr std::int64_t PERIOD_NS = 1000000000;
 using diagnostic_msgs::DiagnosticStatus;
 
 template <typename T>
-void put(DiagnosticStatus& status, const char* key, const T& value) {
+void putValue(DiagnosticStatus& status, const char* key, const T& value) {
   std::ostringstream text;
   text << value;
   diagnostic_msgs::KeyValue pair;
@@ -72,10 +72,10 @@ void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, cons
 /// A recorded run has none: nobody waited.
 void Diagnostics::putLatency(DiagnosticStatus& status) const {
   if (latency_.count() == 0) return;
-  put(status, "worst latency [s]", worst_latency_s_);
-  put(status, "latency since start: median [s]", latency_.quantile(0.5));
-  put(status, "latency since start: p99 [s]", latency_.quantile(0.99));
-  put(status, "latency since start: worst [s]", latency_.worst());
+  putValue(status, "worst latency [s]", worst_latency_s_);
+  putValue(status, "latency since start: median [s]", latency_.quantile(0.5));
+  putValue(status, "latency since start: p99 [s]", latency_.quantile(0.99));
+  putValue(status, "latency since start: worst [s]", latency_.worst());
 }
 
 bool Diagnostics::isDue(std::int64_t now_ns) const { return now_ns - last_ns_ >= PERIOD_NS; }
@@ -93,24 +93,24 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   const std::uint64_t dropped = context.frames.of(StepStatus::QUEUE_FULL);
   judge(status, dropped > dropped_before_, enabled, map_topic, hint);
   dropped_before_ = dropped;
-  put(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
-  put(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
+  putValue(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
+  putValue(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
   putLatency(status);
-  put(status, "frames received", context.frames.received);
-  put(status, "frames processed", context.frames.processed());
-  put(status, "frames started anew", context.frames.started());
-  put(status, "frames skipped", context.frames.skipped());
-  put(status, "frames dropped", dropped);
-  put(status, "time jumps", context.frames.of(StepStatus::TIME_JUMP));
-  put(status, "gaps", context.frames.of(StepStatus::GAP));
-  put(status, "steps not wholly published", context.steps_unpublished);
-  put(status, "frames handed over in process", context.frames_handed_over);
-  put(status, "unusable transforms", context.transforms_unusable);
-  put(status, "wrong row_steps", context.wrong_row_steps);
-  put(status, "refused requests for objects", context.requests_refused);
-  put(status, "maps received", context.maps_received);
-  put(status, "maps refused", context.maps_refused);
-  if (map_present_) put(status, "map age [s]", map_age_s_);
+  putValue(status, "frames received", context.frames.received);
+  putValue(status, "frames processed", context.frames.processed());
+  putValue(status, "frames started anew", context.frames.started());
+  putValue(status, "frames skipped", context.frames.skipped());
+  putValue(status, "frames dropped", dropped);
+  putValue(status, "time jumps", context.frames.of(StepStatus::TIME_JUMP));
+  putValue(status, "gaps", context.frames.of(StepStatus::GAP));
+  putValue(status, "steps not wholly published", context.steps_unpublished);
+  putValue(status, "frames handed over in process", context.frames_handed_over);
+  putValue(status, "unusable transforms", context.transforms_unusable);
+  putValue(status, "wrong row_steps", context.wrong_row_steps);
+  putValue(status, "refused requests for objects", context.requests_refused);
+  putValue(status, "maps received", context.maps_received);
+  putValue(status, "maps refused", context.maps_refused);
+  if (map_present_) putValue(status, "map age [s]", map_age_s_);
   outcomes_ = answers_ = 0;
   worst_latency_s_ = 0;
   diagnostic_msgs::DiagnosticArray array;

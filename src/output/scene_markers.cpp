@@ -13,7 +13,7 @@ namespace {
 
 using visualization_msgs::Marker;
 
-constexpr double VOXEL = 0.97;  // of its edge: a cube a little smaller, so that one shows beside the next
+constexpr double SHOWN_EDGE = 0.97;  // of its edge: a cube a little smaller, so that one shows beside the next
 
 /// By a point, if that is finite.
 void widen(Box& box, const Vec3& p) {
@@ -52,7 +52,7 @@ void addObstacle(MarkerDrawing& drawing) {
     ++shown;
     const auto [list, is_new] = by_size.try_emplace(leaf.size);
     if (is_new) {
-      list->second = drawing.makeInMap("obstacle", Marker::CUBE_LIST, VOXEL * edge);
+      list->second = drawing.makeInMap("obstacle", Marker::CUBE_LIST, SHOWN_EDGE * edge);
       list->second.id = static_cast<int>(leaf.size);
       list->second.color = color(0.62, 0.62, 0.6);
     }
@@ -66,7 +66,7 @@ void addOwn(MarkerDrawing& drawing) {
   const auto& voxels = drawing.outcome.step->map.own.voxels;
   if (!drawing.outcome.obstacle || !voxels) return;
   const double edge = drawing.outcome.obstacle->resolution();
-  Marker marker = drawing.makeInMap("own", Marker::CUBE_LIST, VOXEL * edge);
+  Marker marker = drawing.makeInMap("own", Marker::CUBE_LIST, SHOWN_EDGE * edge);
   for (std::size_t i = 0; i < std::min(voxels->size(), MAX_VOXELS_SHOWN); ++i) {
     const OwnVoxel& voxel = (*voxels)[i];
     marker.points.push_back(point(voxelMin(voxel.key, edge) + Vec3::Constant(0.5 * edge)));

@@ -40,7 +40,7 @@ void forFields(const StudyRow& row, Visit visit) {
 }
 
 /// "8", "0.35": two digits are all that a time has.
-std::string rounded(double value) {
+std::string twoDigits(double value) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(value >= 9.95 ? 0 : value >= 0.995 ? 1 : 2) << value;
   return text.str();
@@ -50,9 +50,9 @@ std::string lateAndEarly(const FirstErrors& errors) {
   constexpr double NOTHING_MS = 0.005;
   if (errors.late_ms < NOTHING_MS && errors.early_ms > -NOTHING_MS) return "first contacts when they were";
   std::string text;
-  if (errors.late_ms >= NOTHING_MS) text = "up to " + rounded(errors.late_ms) + " ms late";
+  if (errors.late_ms >= NOTHING_MS) text = "up to " + twoDigits(errors.late_ms) + " ms late";
   if (errors.early_ms > -NOTHING_MS) return "first contacts " + text;
-  return "first contacts " + text + (text.empty() ? "" : ", ") + "up to " + rounded(-errors.early_ms) + " ms early";
+  return "first contacts " + text + (text.empty() ? "" : ", ") + "up to " + twoDigits(-errors.early_ms) + " ms early";
 }
 
 }  // namespace
@@ -97,14 +97,14 @@ std::string AccuracyStudy::sentence() const {
   if (!best) return "Nothing that was tried saves a tenth of the time.";
   const FirstErrors& patches = best->errors.patches;
   std::ostringstream text;
-  text << best->varied << ' ' << best->setting << ": " << rounded(100 * shareOfTime(*best)) << " % of the time, ";
+  text << best->varied << ' ' << best->setting << ": " << twoDigits(100 * shareOfTime(*best)) << " % of the time, ";
   if (wrong(*best) == 0) {
     text << "no patch of " << patches.touched << " missed or invented";
   } else {
     text << patches.missed << " of " << patches.touched << " patches missed and " << patches.invented << " invented";
   }
   if (patches.missed < patches.touched) {
-    text << ", " << lateAndEarly(patches) << " (95 % within " << rounded(patches.p95_ms) << " ms)";
+    text << ", " << lateAndEarly(patches) << " (95 % within " << twoDigits(patches.p95_ms) << " ms)";
   }
   if (wrong(*best) > 0) text << "; nothing that was tried saves a tenth of the time and gets all of them right";
   text << '.';

@@ -12,8 +12,6 @@
 namespace dccd {
 namespace {
 
-using Feature = FeatureTree::Feature;
-
 bool isIdentity(const Eigen::Isometry3d& pose) { return pose.matrix() == Eigen::Isometry3d::Identity().matrix(); }
 
 /// It holds something, and squares of distances stay finite.
@@ -139,7 +137,7 @@ void ClearanceFinder::takeContacts(const ClearancePart& part) {
   }
   for (const Contact* c : first) {
     if (!c) continue;
-    std::array<Feature, 2> vertex{{{NO_INDEX, NO_INDEX, NO_INDEX}, {NO_INDEX, NO_INDEX, NO_INDEX}}};
+    std::array<FeatureTree::Feature, 2> vertex{{{NO_INDEX, NO_INDEX, NO_INDEX}, {NO_INDEX, NO_INDEX, NO_INDEX}}};
     const auto [of_first, of_second] = factsOf(c->kind).vertices;
     std::copy_n(c->vertex.begin(), of_first, vertex[0].begin());
     std::copy_n(c->vertex.begin() + of_first, of_second, vertex[1].begin());
@@ -150,7 +148,7 @@ void ClearanceFinder::takeContacts(const ClearancePart& part) {
 
 /// Where two features that the step reports touch. The first of the step's is kept.
 void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<std::uint16_t, 2> body,
-                              std::array<Feature, 2> vertex, const OccupiedLeaf* leaf) {
+                              std::array<FeatureTree::Feature, 2> vertex, const OccupiedLeaf* leaf) {
   Row* row = rowOf(body[0], body[1]);
   if (!row || row->touches) return;
   row->touches = true;

@@ -45,7 +45,7 @@ struct Seen : Driven {
     pipeline.nextOutcome(0, outcome);
   }
 };
-constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
+constexpr float NO_DEPTH = std::numeric_limits<float>::quiet_NaN();
 
 TEST(DepthImage, TheNewestCloudHoldsWhateverItsTriangles) {
   Seen scene;
@@ -57,12 +57,12 @@ TEST(DepthImage, TheNewestCloudHoldsWhateverItsTriangles) {
   EXPECT_EQ(scene.outcome.start_state, StartState::CLEAR);
   // Another cloud with other triangles: the plane is 0.15 m higher, half of it.
   scene.feed(1.2, 0.3f);
-  scene.see(1.25, {0.15f, 0.15f, 0.15f, 0.15f, LOST, LOST, LOST, LOST});
+  scene.see(1.25, {0.15f, 0.15f, 0.15f, 0.15f, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH});
   const Outcome& higher = scene.feed(1.3, 0.1f);
   EXPECT_EQ(higher.status, StepStatus::OK) << higher.reason;
   EXPECT_NEAR(higher.earliest_toc, 0.75, 1e-6) << "0.3 to 0.1 meets 0.15";
   // The cloth now hangs over a hole in what is seen.
-  scene.see(1.35, {0, LOST, LOST, LOST, LOST, 0, 0, 0});
+  scene.see(1.35, {0, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, 0, 0, 0});
   scene.feed(1.4, 0.3f);
   const Outcome& hole = scene.feed(1.5, -0.1f);
   EXPECT_EQ(hole.status, StepStatus::OK) << hole.reason;
@@ -74,7 +74,7 @@ TEST(DepthImage, TheNewestCloudHoldsWhateverItsTriangles) {
 TEST(DepthImage, ACameraThatSeesNothingIsNoSurfaceAndNoAnswer) {
   Seen scene;
   scene.see(1, {0, 0, 0, 0, 0, 0, 0, 0});
-  scene.see(1.05, {LOST, LOST, LOST, LOST, LOST, LOST, LOST, LOST});
+  scene.see(1.05, {NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH});
   EXPECT_EQ(scene.pipeline.monitor().counters(1).of(StepStatus::BAD_MESSAGE), 1u);
   const std::string complaint = scene.pipeline.takeComplaint(1);
   EXPECT_NE(complaint.find("no three of the 64 kept pixels"), std::string::npos) << complaint;
