@@ -40,7 +40,7 @@ find_package(yaml-cpp REQUIRED)
 # needs of another one has to be here: test/package/fuzzers_test.py looks for it in each run.
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
-  src/apps/make_scene_bag/physics/expectations.cpp src/apps/make_scene_bag/physics/scene_file.cpp
+  src/apps/make_scene_bag/physics/scene_file.cpp
   src/apps/make_scene_bag/physics/shapes.cpp src/config/parameter_reader.cpp src/config/parameter_yaml.cpp
   src/input/depth_surface.cpp src/input/known_types.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp
   src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp

@@ -117,7 +117,8 @@ def summarize(arguments, listener, start):
         'first_contact_s': {k: first[k][0] for k in sorted(first)},
         'statuses': {}, 'start_states': {},
         'latency_ms': {}, 'step_ms': {},
-        'story': scene_story.lines(scene_story.tell(steps)), 'broken_facts': scene_story.broken_facts(expect, steps),
+        'story': scene_story.lines(scene_story.tell(steps)),
+        'broken_facts': scene_story.broken_facts(expect, steps, {name for array in arrays for name in array.bodies}),
     }
     for array in arrays:
         for key, name in (('statuses', STATUS_NAMES[array.status]), ('start_states', START_STATE[array.start_state])):

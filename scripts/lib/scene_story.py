@@ -143,17 +143,32 @@ def broken_patches(name, what, expected, events):
     return broken
 
 
-def broken_facts(expect, steps, events=None):
-    """Of a scene's `expect` block, the facts that do not hold of these steps and, where given, of the patches' events, each a
-    line; none when all hold."""
+def unknown_words(name, fact, bodies):
+    """What of a fact nobody reads, each a line: a word that is none, a name that no body has."""
+    words = {'until_s', 'again_s', 'share_at_least'} if name == 'clear' else {'first_contact_s', 'contacts_at_least', 'ends_s', 'lasts'}
+    if name == 'body':
+        words.add('names')
+    if name not in (OCTOMAP, SELF, 'body', 'clear'):
+        return ['%s: no such fact' % name]
+    found = [] if fact == 'none' else ['%s: %s is not known' % (name, word) for word in sorted(set(fact) - words)]
+    return found + ['%s: nobody is called %s' % (name, one) for one in fact['names'] if one not in bodies] if 'names' in fact else found
+
+
+def broken_facts(expect, steps, bodies, events=None):
+    """Of a scene's `expect` block, the facts that do not hold of these steps, between bodies of these names, and, where given,
+    of the patches' events, each a line; none when all hold."""
     if not steps:
         return ['no step was answered']
     story, broken = tell(steps), []
     for name, expected in expect.items():
-        if name == 'clear':
-            broken += broken_clear(expected, steps, story)
-            continue
         for one in expected if isinstance(expected, list) else [expected]:
+            unknown = unknown_words(name, one, bodies)
+            broken += unknown
+            if unknown:
+                continue
+            if name == 'clear':
+                broken += broken_clear(one, steps, story)
+                continue
             what = frozenset(one['names']) if name == 'body' else name
             broken += broken_contact(name, what, one, story)
             if events is not None:

@@ -79,8 +79,8 @@ class RobotReader {
     for (const std::string& name : robot_.named_links) {
       const auto same = [&name](const Link& link) { return link.name == name; };
       if (std::none_of(robot_.links.begin(), robot_.links.end(), same))
-        throw std::runtime_error(scene_path_ + ": '" + name + "' is no body of the scene, and no link of " +
-                                 robot_.description);
+        throw std::runtime_error(scene_path_ + ": a gripper names '" + name + "', and " + robot_.description +
+                                 " has no link of that name");
     }
   }
 };

@@ -87,58 +87,6 @@ TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
       "3, cols: 4");
 }
 
-TEST(SceneFile, WhatItExpectsIsReadStrictly) {
-  // Five frames at 30 Hz: the last one comes after 0.133 s.
-  const std::string text = std::string(GOOD) +
-                           "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
-                           "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n";
-  const auto with = [&](const std::string& expect) {
-    return errorOf(text, "bodies:", "expect:\n" + expect + "bodies:");
-  };
-  const auto expectTold = [&](const std::string& expect, const std::string& part) {
-    scene::expectTold("bodies:", "expect:\n" + expect + "bodies:", part, text);
-  };
-  EXPECT_EQ(with("  octomap: {first_contact_s: [0.05, 0.1], contacts_at_least: 3}\n  self: none\n"
-                 "  body: {names: [sheet, finger], first_contact_s: [0.05, 0.05]}\n"
-                 "  clear: {until_s: 0.05, again_s: 0.1, share_at_least: 0.5}\n"),
-            "accepted");
-  EXPECT_EQ(with("  clear: {share_at_least: 1}\n"), "accepted");
-  EXPECT_EQ(with("  self: {first_contact_s: [0, 0.1], ends_s: [0.1, 0.13]}\n"), "accepted");
-  EXPECT_EQ(with("  self: {first_contact_s: [0, 0.1], lasts: true}\n"), "accepted");
-  expectTold("  self: {first_contact_s: [0, 0.1], ends_s: [0.1, 0.13], lasts: true}\n", "lasts contradicts ends_s");
-  expectTold("  self: {first_contact_s: [0.1, 0.12], ends_s: [0.01, 0.05]}\n", "ends_s is before first_contact_s");
-
-  expectTold("  selv: none\n", "s.yaml:7: expect/selv is not known; nearest is expect/self");
-  expectTold("  {}\n", "expect needs at least one fact");
-  expectTold("  self: never\n", "s.yaml:7: expect/self is a string, a section is needed");
-  expectTold("  self: {}\n", "expect/self/first_contact_s is needed: a list of 2 numbers");
-  expectTold("  self: {first_contact_s: 0.1}\n", "expect/self/first_contact_s must be a list of 2 numbers");
-  expectTold("  self: {first_contact_s: [0.1, 0.05]}\n",
-             "expect/self/first_contact_s must be the earliest time, then the latest");
-  expectTold("  self: {first_contact_s: [0.1, 0.2]}\n",
-             "expect/self/first_contact_s is 0.2, it must be from 0 to 0.133");
-  expectTold("  self: {first_contact_s: [0, 0.1], contacts_at_least: 0}\n",
-             "contacts_at_least is 0, it must be from 1");
-  expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect/self/least is not known");
-  expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect/body/names is needed");
-  expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect/body/names must be a list of 2 texts");
-  expectTold("  body: {names: [sheet, [a]], first_contact_s: [0, 0.1]}\n",
-             "expect/body/names must be a list of 2 texts");
-  expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n",
-             "has 'thumb', which is no body of the scene");
-  expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "has one name twice");
-  expectTold("  clear: {until_s: 0.2}\n", "expect/clear/until_s is 0.2, it must be from 0 to 0.133");
-  expectTold("  clear: {until_s: 0.1, again_s: 0.05}\n", "expect/clear/again_s is 0.05, it must be from 0.1 to 0.133");
-  expectTold("  clear: {share_at_least: 2}\n", "expect/clear/share_at_least is 2, it must be from 0 to 1");
-  expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {until_s: 0.06}\n",
-             "expect/clear/until_s contradicts first_contact_s: [0.05, 0.1]; write no later time than its first");
-  expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {again_s: 0.09}\n",
-             "expect/clear/again_s contradicts first_contact_s: [0.05, 0.1]; write no earlier time than its last");
-  scene::expectTold("bodies:", "expect: {octomap: {first_contact_s: [0, 0.1]}}\nbodies:",
-                    "expect/octomap has no meaning without an obstacle; remove this line");
-  EXPECT_EQ(errorOf(GOOD, "bodies:", "expect: {octomap: none}\nbodies:"), "accepted");
-}
-
 TEST(SceneFile, ACameraIsReadStrictly) {
   const std::string text = std::string(GOOD) +
                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
@@ -215,23 +163,20 @@ TEST(SceneFile, ARobotsJointsAndWhatItsLinksHoldAreRead) {
   const std::string good = std::string(GOOD).replace(std::string(GOOD).find("[0, 0, 1]}"), 11, held) +
                            "robot:\n  description: arm.urdf\n  base_m: [1, 2, 3]\n"
                            "  joints: {lift: [{time_s: 0, position: 1}, {time_s: 0.1, position: -2}]}\n"
-                           "expect: {body: [{names: [sheet, finger], first_contact_s: [0, 0.1]},\n"
-                           "                {names: [sheet, hand], first_contact_s: none}]}\n";
+                           "expect: {body: {names: [sheet, thumb], first_contact_s: none}}\n";
   const SceneSpec spec = parseScene(good, "s.yaml");
   ASSERT_TRUE(spec.robot.has_value());
   EXPECT_EQ(spec.robot->description, "arm.urdf");
   EXPECT_EQ(spec.robot->base_m, Vec3(1, 2, 3));
   ASSERT_EQ(spec.robot->joints.at("lift").size(), 2u);
   EXPECT_EQ(spec.robot->joints.at("lift")[1].position, -2);
-  EXPECT_EQ(spec.robot->named_links, (std::vector<std::string>{"hand", "finger", "hand"}));
+  EXPECT_EQ(spec.robot->named_links, std::vector<std::string>{"hand"});
   const Gripper& gripper = spec.bodies[0].grippers.at(0);
   EXPECT_EQ(gripper.link, "hand");
   EXPECT_EQ(gripper.grasp_s, 0.05);
   expectTold("time_s: 0.1, p", "time_s: 0, p", "joints/lift[1]/time_s must be later", good);
   expectTold("  description: arm.urdf\n", "", "robot/description is needed", good);
   expectTold("link: hand", "link: hand, motion: [{time_s: 0}]", "grippers[0]/motion contradicts link", good);
-  expectTold("[sheet, finger], first", "[sheet, sheet], first", "expect/body[0]/names has one name twice", good);
-  expectTold("first_contact_s: none", "first_contact_s: none, lasts: true", "expect/body[1]/lasts is not known", good);
   expectTold("frames: 5", "frames: 6", "grippers[0]/link has no meaning without a robot",
              good.substr(0, good.find("robot:")));
 }

@@ -120,7 +120,7 @@ struct Robot {
   std::string description;  ///< file of its URDF
   Vec3 base_m = Vec3::Zero();
   std::map<std::string, std::vector<JointKey>> joints;
-  std::vector<std::string> named_links;  ///< by other parts of the scene
+  std::vector<std::string> named_links;  ///< by grippers
   std::vector<Link> links;               ///< what the URDF says: addRobot()
 };
 
