@@ -29,6 +29,7 @@ find_path(OWN_MESSAGES deformable_ccd/ContactArray.h REQUIRED)
 find_path(ROS_MESSAGES std_msgs/Header.h REQUIRED)
 #catkin_lint: ignore_once duplicate_find
 find_package(PCL REQUIRED COMPONENTS common)
+find_library(TINYXML2_LIBRARY tinyxml2 REQUIRED)
 find_library(LZ4_LIBRARY lz4 REQUIRED)  # flann's headers call it, where nothing is optimised away
 foreach(library rosconsole roscpp_serialization rostime)
   find_library(${library}_LIBRARY ${library} REQUIRED)
@@ -40,16 +41,16 @@ find_package(yaml-cpp REQUIRED)
 # needs of another one has to be here: test/package/fuzzers_test.py looks for it in each run.
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
-  src/apps/make_scene_bag/physics/scene_file.cpp
-  src/apps/make_scene_bag/physics/shapes.cpp src/config/parameter_reader.cpp src/config/parameter_yaml.cpp
-  src/input/depth_surface.cpp src/input/known_types.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp
-  src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp
-  src/input/ply_header.cpp src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
+  src/apps/make_scene_bag/physics/scene_file.cpp src/apps/make_scene_bag/physics/shapes.cpp
+  src/config/parameter_reader.cpp src/config/parameter_yaml.cpp src/input/dae_file.cpp src/input/depth_surface.cpp
+  src/input/known_types.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp src/input/mesh_file.cpp
+  src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp src/input/ply_header.cpp
+  src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
   src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
-  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${LZ4_LIBRARY})
+  deformable_ccd_archive yaml-cpp ${TINYXML2_LIBRARY} ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${LZ4_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
 add_custom_target(fuzzers)

@@ -39,8 +39,7 @@ if(ROS_SOURCES)
   if(ROS_USES_PCL)
     target_link_libraries(deformable_ccd_ros PRIVATE ${PCL_COMMON_LIBRARIES})
   endif()
-  target_link_libraries(deformable_ccd_ros PRIVATE
-    ${ASSIMP_LIBRARY} ${URDF_LIBRARY} ${CONSOLE_BRIDGE_LIBRARY} ${TINYXML2_LIBRARY})
+  target_link_libraries(deformable_ccd_ros PRIVATE ${URDF_LIBRARY} ${CONSOLE_BRIDGE_LIBRARY} ${TINYXML2_LIBRARY})
   list(INSERT ROS_LINK_LIBRARIES 0 deformable_ccd_ros)
 endif()
 

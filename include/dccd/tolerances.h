@@ -42,8 +42,8 @@ constexpr double SMALLEST_RESOLUTION_M = 1e-290, LARGEST_RESOLUTION_M = 1e290;
 /// [1] How far a map's edge length and the one in its data's own header may differ, for the header has six digits.
 /// Larger: maps that contradict themselves are taken. Smaller: good maps are refused.
 constexpr double OCTOMAP_HEADER = 1e-5;
-/// [1] How far the length of an axis in a DAE may be from 1, for six digits have it so. Larger: meshes are taken that
-/// assimp stretches by as much. Smaller: good files are refused.
+/// [1] How far the length of an axis in a DAE may be from 1, for six digits have it so. Larger: axes are taken
+/// that others stretch a mesh by. Smaller: good files are refused.
 constexpr double DAE_AXIS = 1e-6;
 
 // --- projections and bounds ------------------------------------------------------------------------------------------

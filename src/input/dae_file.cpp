@@ -1,198 +1,334 @@
 #include "input/dae_file.h"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <chrono>
-#include <csignal>
-#include <cstring>
-#include <exception>
-#include <fstream>
-#include <vector>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <string_view>
 
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
 #include <Eigen/Geometry>
-#include <assimp/Importer.hpp>
 
-#include "input/dae_check.h"
+#include "dccd/decimal.h"
+#include "dccd/tolerances.h"
 
 namespace dccd {
-
 namespace {
 
-constexpr rlim_t CHILD_BYTES = rlim_t{1} << 30;  // on top of what this process has
-constexpr rlim_t CHILD_CPU_S = 20;
-constexpr std::chrono::seconds CHILD_WALL{60};
-constexpr char GOOD = 'm', BAD = 'e';  // the first byte of an answer: polygons follow, or words
+using tinyxml2::XMLElement;
 
-Eigen::Affine3d affine(const aiMatrix4x4& m) {
-  Eigen::Affine3d out;
-  out.matrix() << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4;
-  return out;
+// An element or attribute takes up to 120 bytes of memory, however few of the file; and a node can stand in the scene
+// again and again. A step is an index or a position; a node or a part of a mesh takes as long as many of them.
+constexpr std::ptrdiff_t MOST_MARKS = 4000000;
+constexpr std::size_t MOST_STEPS = 30000000, STEPS_OF_ELEMENT = 30, MOST_CORNERS = 20000000, MOST_DEPTH = 256;
+
+[[noreturn]] void refuse(const XMLElement& at, const std::string& what) {
+  throw std::invalid_argument("line " + std::to_string(at.GetLineNum()) + ": <" + at.Name() + "> " + what);
 }
 
-void addPolygons(const aiScene& scene, const aiNode& root, Positions& corners, std::vector<std::uint64_t>& ends) {
-  struct Placed {
-    const aiNode* node;
-    Eigen::Affine3d parent;
-  };
-  std::vector<Placed> open{{&root, Eigen::Affine3d::Identity()}};
-  while (!open.empty()) {
-    const Placed at = open.back();
-    open.pop_back();
-    const Eigen::Affine3d transform = at.parent * affine(at.node->mTransformation);
-    for (unsigned i = 0; i < at.node->mNumMeshes; ++i) {
-      const aiMesh& mesh = *scene.mMeshes[at.node->mMeshes[i]];
-      for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-        const aiFace& face = mesh.mFaces[f];
-        for (unsigned k = 0; k < face.mNumIndices; ++k) {
-          const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
-          corners.push_back(transform * Vec3(p.x, p.y, p.z));
-        }
-        ends.push_back(corners.size());
-      }
-    }
-    for (unsigned c = at.node->mNumChildren; c-- > 0;) open.push_back({at.node->mChildren[c], transform});
-  }
+std::string attribute(const XMLElement& at, const char* name) {
+  const char* value = at.Attribute(name);
+  return value ? value : "";
 }
 
-/// In the child: a byte, then words; or the number of polygons, their ends and the coordinates of their corners.
-std::string answerOf(const std::string& bytes) {
-  try {
-    if (const std::string problem = daeProblem(bytes); !problem.empty()) return BAD + problem;
-    Assimp::Importer importer;
-    importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-    importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);  // else its nodes, where there is no mesh
-    const aiScene* scene =
-        importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_ValidateDataStructure, "dae");
-    if (!scene || !scene->mRootNode) return BAD + std::string(importer.GetErrorString());
-    Positions corners;
-    std::vector<std::uint64_t> ends;
-    addPolygons(*scene, *scene->mRootNode, corners, ends);
-    std::string answer(1, GOOD);
-    const auto append = [&](const void* data, std::size_t size) {
-      answer.append(static_cast<const char*>(data), size);
-    };
-    const std::uint64_t count = ends.size();
-    append(&count, sizeof count);
-    append(ends.data(), ends.size() * sizeof ends[0]);
-    append(corners.data(), corners.size() * sizeof corners[0]);
-    return answer;
-  } catch (const std::exception& error) {
-    return BAD + std::string(error.what());
-  }
+/// Calls `see` with each child of this name.
+template <class See>
+void forChildren(const XMLElement& at, const char* name, const See& see) {
+  for (auto* child = at.FirstChildElement(name); child; child = child->NextSiblingElement(name)) see(*child);
 }
 
-/// Pages of this process that a limit on data counts.
-rlim_t dataBytes() {
-  std::ifstream statm("/proc/self/statm");
-  rlim_t pages = 0;
-  for (int field = 0; field < 6; ++field) statm >> pages;  // the sixth is data and stack
-  return pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
-}
-
-[[noreturn]] void runChild(const std::string& bytes, rlim_t data_bytes, int pipe) {
-  // The crash of the child is no crash of the node: no handler, no core.
-  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTERM, SIGINT}) std::signal(number, SIG_DFL);
-  const auto limit = [](auto what, rlim_t value) {
-    const rlimit to{value, value};
-    ::setrlimit(what, &to);
-  };
-  limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_CPU, CHILD_CPU_S);
-  limit(RLIMIT_DATA, data_bytes + CHILD_BYTES);
-  const std::string answer = answerOf(bytes);
-  for (std::size_t sent = 0; sent < answer.size();) {
-    const ssize_t n = ::write(pipe, answer.data() + sent, answer.size() - sent);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) break;
-    sent += static_cast<std::size_t>(n);
-  }
-  ::_exit(0);  // without this process' destructors
-}
-
-/// What the child says until it ends or its time is over.
-std::string readAnswer(int pipe) {
-  std::string answer;
-  std::vector<char> part(1 << 16);
-  const auto end = std::chrono::steady_clock::now() + CHILD_WALL;
+/// Calls `see` with each word of the element's text.
+template <class See>
+void forEachWord(const XMLElement& at, const See& see) {
+  constexpr const char* BLANKS = " \t\r\n";
+  if (at.FirstChild() != at.LastChild()) refuse(at, "has something beside its text, as a comment");
+  std::string_view text = at.GetText() ? at.GetText() : "";
   while (true) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-    if (left.count() <= 0) return {};
-    pollfd wait{pipe, POLLIN, 0};
-    const int ready = ::poll(&wait, 1, static_cast<int>(left.count()));
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) return {};
-    const ssize_t n = ::read(pipe, part.data(), part.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return answer;
-    answer.append(part.data(), static_cast<std::size_t>(n));
+    text.remove_prefix(std::min(text.find_first_not_of(BLANKS), text.size()));
+    if (text.empty()) return;
+    const std::size_t end = std::min(text.find_first_of(BLANKS), text.size());
+    see(text.substr(0, end));
+    text.remove_prefix(end);
   }
 }
 
-std::string askChild(const std::string& path, const std::string& bytes) {
-  const rlim_t data_bytes = dataBytes();
-  int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) throw MeshFileError(path + ": no pipe to a child process that reads it");
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::close(ends[0]);
-    runChild(bytes, data_bytes, ends[1]);
-  }
-  ::close(ends[1]);
-  const std::string answer = child < 0 ? std::string() : readAnswer(ends[0]);
-  ::close(ends[0]);
-  if (child < 0) throw MeshFileError(path + ": no child process to read it in");
-  ::kill(child, SIGKILL);  // nothing to one that has ended
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return answer;
+std::vector<double> numbersOf(const XMLElement& at) {
+  std::vector<double> numbers;
+  forEachWord(at, [&](std::string_view word) {
+    const auto number = decimalNumber(word);
+    if (!number) refuse(at, "has '" + std::string(word) + "', which is no decimal number");
+    numbers.push_back(*number);
+  });
+  return numbers;
 }
 
-/// What a child says that came to its end. False: this one did not.
-bool readPolygons(const std::string& answer, Positions& corners, std::vector<std::size_t>& ends) {
-  constexpr std::size_t HEAD = 1 + sizeof(std::uint64_t);
-  std::uint64_t count = 0;
-  if (answer.size() < HEAD) return false;
-  std::memcpy(&count, answer.data() + 1, sizeof count);
-  if (count > (answer.size() - HEAD) / sizeof count) return false;
-  const std::size_t begin = HEAD + count * sizeof count, bytes = answer.size() - begin;
-  if (bytes % sizeof(Vec3) != 0) return false;
-  ends.resize(count);
-  corners.resize(bytes / sizeof(Vec3));
-  if (count > 0) std::memcpy(ends.data(), answer.data() + HEAD, begin - HEAD);
-  if (bytes > 0) std::memcpy(corners.data()->data(), answer.data() + begin, bytes);
-  return std::is_sorted(ends.begin(), ends.end()) && (ends.empty() ? 0 : ends.back()) == corners.size();
+/// Calls `see` with each word, an integer from 0 on.
+template <class See>
+void forEachIndex(const XMLElement& at, const See& see) {
+  forEachWord(at, [&](std::string_view word) {
+    const auto index = decimalInteger(word);
+    if (!index || *index < 0) refuse(at, "has '" + std::string(word) + "', which is no integer from 0 on");
+    see(static_cast<std::size_t>(*index));
+  });
 }
+
+/// An attribute that counts; without it `otherwise`.
+std::size_t countOf(const XMLElement& at, const char* name, std::size_t otherwise) {
+  const std::string word = attribute(at, name);
+  if (word.empty()) return otherwise;
+  const auto count = decimalInteger(word);
+  if (!count || *count < 0 || *count > std::int64_t{1} << 31)
+    refuse(at, std::string("has a ") + name + " of '" + word + "'");
+  return static_cast<std::size_t>(*count);
+}
+
+double metresOf(const XMLElement& unit) {
+  const auto metres = decimalNumber(attribute(unit, "meter").empty() ? "1" : attribute(unit, "meter"));
+  if (!metres || !(*metres > 0)) refuse(unit, "has a meter of '" + attribute(unit, "meter") + "'");
+  return *metres;
+}
+
+/// All that has an id, and the units of other parts than the file.
+class Ids : public tinyxml2::XMLVisitor {
+ public:
+  bool VisitEnter(const XMLElement& at, const tinyxml2::XMLAttribute*) override {
+    if (at.Attribute("id")) by_id_[{at.Name(), '#' + attribute(at, "id")}].push_back(&at);
+    if (at.Name() == std::string_view("unit")) units_.push_back(&at);
+    return true;
+  }
+  /// What an attribute refers to.
+  const XMLElement& find(const XMLElement& use, const char* by, const std::string& kind) const {
+    const std::string url = attribute(use, by);
+    const auto found = by_id_.find({kind, url});
+    const std::string said = std::string("has the ") + by + " '" + url + "', ";
+    if (found == by_id_.end()) refuse(use, said + "and the file has no " + kind + " of that id");
+    if (found->second.size() > 1) refuse(use, said + "of several");
+    return *found->second[0];
+  }
+  /// The file's. Programs differ on what a part's own is for.
+  double metres(const XMLElement& root) const {
+    double metres = 1;
+    forChildren(root, "asset", [&](const XMLElement& asset) {
+      forChildren(asset, "unit", [&](const XMLElement& unit) { metres = metresOf(unit); });
+    });
+    for (const XMLElement* unit : units_) {
+      if (metresOf(*unit) != metres) refuse(*unit, "is another one than the file's, which alone is read");
+    }
+    return metres;
+  }
+
+ private:
+  std::map<std::pair<std::string, std::string>, std::vector<const XMLElement*>> by_id_;
+  std::vector<const XMLElement*> units_;
+};
+
+/// One of a node; of what is none, the identity.
+Eigen::Affine3d transformOf(const XMLElement& at) {
+  static const std::map<std::string_view, std::size_t> TRANSFORMS{
+      {"translate", 3}, {"rotate", 4}, {"scale", 3}, {"matrix", 16}};
+  const std::string_view name = at.Name();
+  if (name == "skew" || name == "lookat") refuse(at, "is not read; write the node with a <matrix>");
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  const auto known = TRANSFORMS.find(name);
+  if (known == TRANSFORMS.end()) return transform;
+  const std::vector<double> n = numbersOf(at);
+  if (n.size() != known->second) refuse(at, "must have " + std::to_string(known->second) + " numbers");
+  if (name == "translate") transform.translate(Vec3(n[0], n[1], n[2]));
+  if (name == "scale") transform.scale(Vec3(n[0], n[1], n[2]));
+  if (name == "rotate" && n[3] != 0) {
+    const Vec3 axis(n[0], n[1], n[2]);
+    if (!(std::abs(axis.norm() - 1) <= tolerance::DAE_AXIS)) refuse(at, "has an axis whose length is not 1");
+    transform.rotate(Eigen::AngleAxisd(n[3] * M_PI / 180, axis.normalized()));
+  }
+  if (name == "matrix") {
+    transform.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n.data());
+    if (transform.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) refuse(at, "must end with 0 0 0 1");
+  }
+  return transform;
+}
+
+class DaeReader {
+ public:
+  explicit DaeReader(const XMLElement& root) : root_(root) { root.Accept(&ids_); }
+
+  /// The corners of all polygons of the scene, and where each polygon ends.
+  Positions corners;
+  std::vector<std::size_t> ends;
+
+  void read() {
+    const Eigen::Affine3d unit(Eigen::Scaling(ids_.metres(root_)));
+    forChildren(root_, "scene", [&](const XMLElement& scene) {
+      forChildren(scene, "instance_visual_scene", [&](const XMLElement& use) {
+        forChildren(ids_.find(use, "url", "visual_scene"), "node",
+                    [&](const XMLElement& node) { addNode(node, unit, 0); });
+      });
+    });
+  }
+
+ private:
+  const XMLElement& root_;
+  Ids ids_;
+  std::map<const XMLElement*, Positions> positions_;  // of each source
+  std::size_t steps_ = 0;
+
+  void step(const XMLElement& at, std::size_t cost = 1) {
+    steps_ += cost;
+    if (steps_ > MOST_STEPS || corners.size() > MOST_CORNERS) refuse(at, "is too much: the scene is too large");
+  }
+
+  void addNode(const XMLElement& node, Eigen::Affine3d pose, std::size_t depth) {
+    step(node, STEPS_OF_ELEMENT);
+    if (depth > MOST_DEPTH) refuse(node, "holds itself, or lies too deep");
+    for (auto* child = node.FirstChildElement(); child; child = child->NextSiblingElement()) {
+      pose = pose * transformOf(*child);
+    }
+    forChildren(node, "instance_controller", [](const XMLElement& use) {
+      refuse(use, "is not read; write the mesh where its skin or morph puts it");
+    });
+    forChildren(node, "instance_geometry", [&](const XMLElement& use) {
+      const XMLElement* mesh = ids_.find(use, "url", "geometry").FirstChildElement("mesh");
+      if (!mesh) refuse(use, "has the url '" + attribute(use, "url") + "', of a geometry without a <mesh>");
+      for (auto* part = mesh->FirstChildElement(); part; part = part->NextSiblingElement()) addPrimitive(*part, pose);
+    });
+    forChildren(node, "node", [&](const XMLElement& child) { addNode(child, pose, depth + 1); });
+    forChildren(node, "instance_node",
+                [&](const XMLElement& use) { addNode(ids_.find(use, "url", "node"), pose, depth + 1); });
+  }
+
+  /// Polygons of every kind that there is; nothing of what is none.
+  void addPrimitive(const XMLElement& at, const Eigen::Affine3d& pose) {
+    step(at, STEPS_OF_ELEMENT);
+    const std::string_view kind = at.Name();
+    const bool triangles = kind == "triangles", lines = kind == "lines", listed = kind == "polylist",
+               strips = kind == "tristrips", fans = kind == "trifans", chains = kind == "linestrips";
+    if (!triangles && !lines && !listed && !strips && !fans && !chains && kind != "polygons") return;
+    forChildren(at, "ph", [](const XMLElement& ph) { refuse(ph, "is a polygon with holes; write it with triangles"); });
+    std::vector<std::size_t> sizes;
+    forChildren(at, "vcount", [&](const XMLElement& vcount) {
+      forEachIndex(vcount, [&](std::size_t size) { sizes.push_back(size); });
+    });
+    std::size_t lists = 0, polygons = sizes.size();
+    forChildren(at, "p", [&](const XMLElement& p) {
+      const Positions list = cornersOf(at, p, pose);
+      const auto add = [&](std::initializer_list<std::size_t> places) {
+        for (const std::size_t place : places) corners.push_back(list[place]);
+        ends.push_back(corners.size());
+      };
+      ++lists;
+      for (std::size_t k = 2; strips && k < list.size(); ++k) add({k - 2 + k % 2, k - 1 - k % 2, k});
+      for (std::size_t k = 2; fans && k < list.size(); ++k) add({0, k - 1, k});
+      for (std::size_t k = 1; chains && k < list.size(); ++k) add({k - 1, k});
+      if (strips || fans || chains) return;
+      if (!listed) {
+        const std::size_t size = triangles ? 3 : lines ? 2 : std::max<std::size_t>(list.size(), 1);
+        sizes.assign(list.size() / size, size);
+        polygons += sizes.size();
+      }
+      std::size_t end = 0;
+      for (const std::size_t size : sizes) {
+        if (size > list.size() - end) refuse(p, "ends within a polygon");
+        corners.insert(corners.end(), list.begin() + end, list.begin() + end + size);
+        ends.push_back(corners.size());
+        end += size;
+      }
+      if (end < list.size()) refuse(p, "has more indices than its polygons have corners");
+    });
+    const std::size_t count = triangles || lines || listed ? polygons : lists;
+    if (count != countOf(at, "count", count)) {
+      refuse(at, "has " + std::to_string(count) + ", and a count of " + attribute(at, "count"));
+    }
+  }
+
+  /// Where the corners are that one list of indices names.
+  Positions cornersOf(const XMLElement& primitive, const XMLElement& p, const Eigen::Affine3d& pose) {
+    const Positions* known = nullptr;
+    std::size_t offset = 0, stride = 1, word = 0;
+    forChildren(primitive, "input", [&](const XMLElement& input) {
+      const std::size_t at = countOf(input, "offset", 0);
+      stride = std::max(stride, at + 1);
+      if (attribute(input, "semantic") != "VERTEX") return;
+      if (known) refuse(input, "is the second VERTEX");
+      known = &positionsOf(ids_.find(input, "source", "vertices"));
+      offset = at;
+    });
+    if (!known) refuse(primitive, "has no <input> of VERTEX");
+    Positions list;
+    forEachIndex(p, [&](std::size_t v) {
+      step(p);
+      if (word++ % stride != offset) return;
+      if (v >= known->size()) refuse(p, "names vertex " + std::to_string(v) + " of " + std::to_string(known->size()));
+      list.push_back(pose * (*known)[v]);
+    });
+    if (word % stride != 0)
+      refuse(p, "has " + std::to_string(word) + " indices, no multiple of " + std::to_string(stride));
+    return list;
+  }
+
+  const Positions& positionsOf(const XMLElement& vertices) {
+    const XMLElement* source = nullptr;
+    forChildren(vertices, "input", [&](const XMLElement& input) {
+      if (attribute(input, "semantic") == "POSITION") source = &ids_.find(input, "source", "source");
+    });
+    if (!source) refuse(vertices, "has no <input> of POSITION");
+    const auto [known, is_new] = positions_.try_emplace(source);
+    if (is_new) known->second = readPositions(*source);
+    return known->second;
+  }
+
+  Positions readPositions(const XMLElement& source) {
+    const XMLElement* technique = source.FirstChildElement("technique_common");
+    const XMLElement* accessor = technique ? technique->FirstChildElement("accessor") : nullptr;
+    if (!accessor) refuse(source, "has no <accessor>");
+    const XMLElement& array = ids_.find(*accessor, "source", "float_array");
+    const std::vector<double> numbers = numbersOf(array);
+    if (numbers.size() != countOf(array, "count", numbers.size())) {
+      refuse(array, "has " + std::to_string(numbers.size()) + " numbers, and a count of " + attribute(array, "count"));
+    }
+    std::map<std::string, std::size_t> place;
+    std::size_t params = 0, named = 0;
+    forChildren(*accessor, "param", [&](const XMLElement& param) {
+      if (param.Attribute("name")) place[attribute(param, "name")] = params, ++named;
+      ++params;
+    });
+    if (named != 3 || place.count("X") + place.count("Y") + place.count("Z") != 3) {
+      refuse(*accessor, "of positions must have one <param> each of the names X, Y and Z, and no others with a name");
+    }
+    const std::size_t count = countOf(*accessor, "count", 0), stride = countOf(*accessor, "stride", 1);
+    const std::size_t first = countOf(*accessor, "offset", 0);
+    if (stride < params) refuse(*accessor, "has more <param> than its stride of " + std::to_string(stride));
+    if (count > 0 && first + (count - 1) * stride + params > numbers.size()) {
+      refuse(*accessor, "goes beyond the " + std::to_string(numbers.size()) + " numbers of '" +
+                            attribute(*accessor, "source") + "'");
+    }
+    Positions positions;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double* at = numbers.data() + first + i * stride;
+      step(source);
+      positions.emplace_back(at[place["X"]], at[place["Y"]], at[place["Z"]]);
+    }
+    return positions;
+  }
+};
 
 }  // namespace
 
 MeshFile loadDaeFile(const std::string& path) {
   const std::string bytes = readWholeFile(path);
-  // Not left to assimp: one that reads the outline alone would fill the holes.
-  if (bytes.find("<ph>") != std::string::npos) {
-    throw MeshFileError(path + ": has polygons with holes (<ph>), which are not read; write it with triangles");
+  const auto fail = [&](const std::string& what) { throw MeshFileError(path + ": not a readable .dae mesh: " + what); };
+  const auto marks = std::count_if(bytes.begin(), bytes.end(), [](char c) { return c == '<' || c == '='; });
+  if (marks > MOST_MARKS) fail("it has more than " + std::to_string(MOST_MARKS) + " tags and attributes");
+  tinyxml2::XMLDocument document;
+  if (document.Parse(bytes.data(), bytes.size()) != tinyxml2::XML_SUCCESS) fail(document.ErrorStr());
+  if (!document.RootElement()) fail("it holds no element");
+  DaeReader reader(*document.RootElement());
+  try {
+    reader.read();
+  } catch (const std::invalid_argument& error) {
+    fail(error.what());
   }
-  const std::string answer = askChild(path, bytes);
-  Positions corners;
-  std::vector<std::size_t> ends;
-  if (!answer.empty() && answer[0] == BAD) {
-    throw MeshFileError(path + ": not a readable .dae mesh: " + answer.substr(1));
-  }
-  if (!readPolygons(answer, corners, ends)) {
-    throw MeshFileError(path + ": assimp did not come to an end of it within " + std::to_string(CHILD_CPU_S) +
-                        " s and 1 GiB, or crashed; the file is damaged");
-  }
-  if (corners.empty()) throw MeshFileError(path + ": there are no triangles");
-  MeshFile mesh = weldPolygons(corners, std::move(ends), path);
+  if (reader.corners.empty()) throw MeshFileError(path + ": there are no triangles");
+  MeshFile mesh = weldPolygons(reader.corners, std::move(reader.ends), path);
   remarkUnchecked([](std::size_t p) { return "polygon " + std::to_string(p) + " of the scene"; }, mesh);
   return mesh;
 }

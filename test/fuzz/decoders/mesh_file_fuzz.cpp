@@ -1,4 +1,4 @@
-// Any bytes as a mesh file: the first chooses STL, PLY or OBJ.
+// Any bytes as a mesh file: the first chooses STL, PLY, OBJ or, as a d, DAE.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -6,6 +6,7 @@
 #include <string>
 
 #include "fuzz/fuzz_target.h"
+#include "input/dae_file.h"
 #include "input/obj_file.h"
 #include "input/ply_file.h"
 #include "input/stl_file.h"
@@ -41,8 +42,8 @@ class NamedBytes {
 void mesh_file(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return;
   static const std::pair<const char*, MeshFile (*)(const std::string&)> FORMATS[] = {
-      {".stl", loadStlFile}, {".ply", loadPlyFile}, {".obj", loadObjFile}};
-  const auto& [ending, load] = FORMATS[data[0] % 3];
+      {".stl", loadStlFile}, {".ply", loadPlyFile}, {".obj", loadObjFile}, {".dae", loadDaeFile}};
+  const auto& [ending, load] = FORMATS[data[0] == 'd' ? 3 : data[0] % 3];
   const NamedBytes file(data + 1, size - 1, ending);
   try {
     const MeshFile mesh = load(file.path());

@@ -717,11 +717,27 @@ TEST_F(DaeGrammar, Nodes) {
   EXPECT_EQ(both.faces.size(), 4u);
 }
 
-TEST_F(DaeGrammar, SinglePrecision) {
-  EXPECT_EQ(readDae(dae(two(), node(), "0.1 0 0 1 0 0 0 1 0 1 1 0.25")).positions[0].x(), double{0.1f});
+TEST_F(DaeGrammar, Coordinates) {
+  EXPECT_EQ(readDae(dae(two(), node(), "0.1 0 0 1 0 0 0 1 0 1 1 0.25")).positions[0].x(), 0.1);
   const std::string far = "1000000 0 0 1000000.01 0 0 1000000 1 0 1000001 1 0";
-  expectUnchecked(readDae(dae(list("triangles", 1, "<p>0 1 2</p>"), node(), far)), {0}, "polygon 0 of the scene");
-  EXPECT_EQ(readDae(dae(list("triangles", 2, "<p>0 2 3 1 2 3</p>"), node(), far)).positions.size(), 3u);
+  EXPECT_EQ(readDae(dae(list("triangles", 2, "<p>0 2 3 1 2 3</p>"), node(), far)).positions.size(), 4u);
+}
+
+/// Positions as numbers 2 to 4 of six, indices as the second of three, and two lists in one element.
+TEST_F(DaeGrammar, Strides) {
+  const std::string input =
+      "<input semantic=\"NORMAL\" source=\"#n\" offset=\"0\"/>"
+      "<input semantic=\"VERTEX\" source=\"#v\" offset=\"1\"/>"
+      "<input semantic=\"TEXCOORD\" source=\"#t\" offset=\"2\" set=\"0\"/>";
+  std::string text =
+      dae("<triangles count=\"2\">" + input + "<p>9 0 9 9 1 9 9 2 9</p><p>9 2 9 9 1 9 9 3 9</p></triangles>", node(),
+          "7 0 0 0 7 7 7 1 0 0 7 7 7 0 1 0 7 7 7 1 1 0.25");
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("count=\"12\"", "count=\"22\"");
+  replace("stride=\"3\">", "stride=\"6\"><param type=\"float\"/>");
+  expectTwo(readDae(text), "numbers between");
 }
 
 TEST_F(DaeGrammar, Lines) {
@@ -735,18 +751,23 @@ TEST_F(DaeGrammar, Lines) {
 
 TEST_F(DaeGrammar, WhatIsRefused) {
   const std::string hole = list("polygons", 1, "<ph><p>0 1 3 2</p><h>0 1 2</h></ph>");
-  expectRefused("a.dae", dae(hole), "a.dae: ", "has polygons with holes (<ph>)");
+  expectRefused("a.dae", dae(hole), "a.dae: ", "<ph> is a polygon with holes");
   for (const std::string count : {"1", "3"}) {
     expectRefused("a.dae", dae(list("triangles", std::stoi(count), "<p>0 1 2 2 1 3</p>")),
                   "a.dae: ", "not a readable .dae mesh");
   }
-  for (const std::string word : {"nan", "1e39"}) {
-    expectRefused("a.dae", dae(two(), node(), word + " 0 0 1 0 0 0 1 0 1 1 0.25"), "a.dae: ", "is not finite");
+  expectRefused("a.dae", dae(two(), node(), "nan 0 0 1 0 0 0 1 0 1 1 0.25"), "a.dae: ", "is not finite");
+  const std::string twice = "<node id=\"m\">" + node() + "<instance_node url=\"#m\"/></node>";
+  expectRefused("a.dae", dae(two(), twice), "a.dae: ", "<node> holds itself, or lies too deep");
+  std::string doubled = "<node id=\"n0\"><instance_geometry url=\"#g\"/></node>";  // 2^40 of them
+  for (int i = 1; i <= 40; ++i) {
+    const std::string use = "<instance_node url=\"#n" + std::to_string(i - 1) + "\"/>";
+    doubled += "<node id=\"n" + std::to_string(i) + "\">" + use + use + "</node>";
   }
+  expectRefused("a.dae", dae(two(), doubled), "a.dae: ", "the scene is too large");
 }
 
-/// All of this assimp reads, as something else.
-TEST_F(DaeGrammar, WhatAssimpWouldReadOtherwise) {
+TEST_F(DaeGrammar, WhatContradictsItself) {
   const std::string good = dae(two());
   const auto expectBad = [&](const std::string& what, const std::string& by, const std::string& reason) {
     ASSERT_NE(good.find(what), std::string::npos) << what;
@@ -755,8 +776,8 @@ TEST_F(DaeGrammar, WhatAssimpWouldReadOtherwise) {
     expectRefused("a.dae", bad, "a.dae: ", reason);
   };
   const std::string geometry = good.substr(good.find("<geometry"), good.find("</library_geo") - good.find("<geometry"));
-  expectBad(geometry, geometry + geometry, "<geometry> has the id 'g', as another one before it");
-  expectBad(geometry, "<geometry id=\"g\"><spline/></geometry>", "no geometry of that id with a <mesh>");
+  expectBad(geometry, geometry + geometry, "<instance_geometry> has the url '#g', of several");
+  expectBad(geometry, "<geometry id=\"g\"><spline/></geometry>", "of a geometry without a <mesh>");
   expectBad("url=\"#g\"", "url=\"#other\"", "<instance_geometry> has the url '#other'");
   expectBad("</node>", "<instance_node url=\"#other\"/></node>", "no node of that id");
   expectBad(node(), node() + node() + "<node><instance_node url=\"#n\"/></node>", "has the url '#n', of several");
@@ -801,7 +822,6 @@ TEST_F(DaeGrammar, AxesOfSixDigits) {
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_LT((mesh.positions[i] - expected[i]).norm(), 1e-5) << i;
 }
 
-/// assimp makes bodies of the nodes of a file that has no mesh.
 TEST_F(DaeGrammar, WithoutAMesh) {
   const std::string nodes = "<node><translate>1 2 3</translate><node><translate>0 1 0</translate></node></node>";
   expectRefused("a.dae", dae(two(), nodes), "a.dae: ", "there are no triangles");

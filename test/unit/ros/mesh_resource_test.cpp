@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <chrono>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -116,16 +114,6 @@ class OddFiles : public test::FolderTest {
   std::string dae_;
 };
 
-/// What fuzzing found: assimp 5.2.5 appends to its list of indices for ever. The child's limit on memory ends that.
-TEST_F(OddFiles, ALetterAmongTheIndicesOfADaeEndsTheChildAndNothingElse) {
-  if (std::getenv("DEFORMABLE_CCD_SANITIZED")) GTEST_SKIP() << "the end of the child would be a sanitizer's report";
-  const std::string path = daeWith("<p>0 3 2 1", "<p>0 3 x 1");
-  const auto start = std::chrono::steady_clock::now();
-  const std::string error = errorOf(path);
-  EXPECT_TRUE(mentions(error, path)) << error;
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
-}
-
 TEST_F(OddFiles, DamagedDaesAreRefusedByName) {
   const std::string cut = write("cut.dae", dae_.substr(0, dae_.size() / 2));
   EXPECT_TRUE(mentions(errorOf(cut), "cut.dae: not a readable .dae mesh: ")) << errorOf(cut);
@@ -133,6 +121,8 @@ TEST_F(OddFiles, DamagedDaesAreRefusedByName) {
   EXPECT_TRUE(mentions(errorOf(empty), empty)) << errorOf(empty);
   const std::string far = daeWith("<p>0 3 2 1", "<p>0 3 2 999");
   EXPECT_TRUE(mentions(errorOf(far), far)) << errorOf(far);
+  const std::string letter = daeWith("<p>0 3 2 1", "<p>0 3 x 1");
+  EXPECT_TRUE(mentions(errorOf(letter), "<p> has 'x', which is no integer")) << errorOf(letter);
   const std::string nan = daeWith("0 0 0 200", "nan 0 0 200");
   EXPECT_TRUE(mentions(errorOf(nan), nan + ": a coordinate is not finite")) << errorOf(nan);
 }
