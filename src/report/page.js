@@ -162,51 +162,11 @@ function frontPlot(id, all, xlabel, ylabel, least) {
 const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
 const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
   return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
-// Of times: early red, late pale, as in RViz. Of numbers: few pale, many blue.
+// Of times: early red, late pale, as in RViz.
 const early = f => colour(1 - f), EARLY_TO_LATE = 'linear-gradient(to right,' + [1, .5, 0].map(colour).join(',') + ')';
-const many = f => `rgb(${[222, 235, 247].map((c, k) => Math.round(c + f * ([8, 69, 148][k] - c))).join(',')})`;
-const FEW_TO_MANY = `linear-gradient(to right,${many(0)},${many(.5)},${many(1)})`;
-// Whether faces look both ways when the body is laid flat, as of a closed one or a tube: then each side gets a picture.
-const turnsOver = b => { let up = 0, down = 0;
-  b.faces.forEach(f => { const [p, q, r] = f.map(v => b.flat[v]), area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-    if (area > 0) up += area; else down -= area; });
-  return Math.min(up, down) > 0.1 * (up + down); };
-// values: per vertex 0 to 1, or null for never. From below it is turned about the upright axis.
-function map(parent, b, values, ramp, gradient, caption, low, high, below) {
-  const xs = b.flat.map(p => below ? -p[0] : p[0]), ys = b.flat.map(p => p[1]), depth = f => f.reduce((sum, v) => sum + (below ? -1 : 1) * b.flat[v][2], 0) / f.length;
-  const faces = b.faces.map(f => [depth(f), f]).sort((p, q) => p[0] - q[0]);  // what is nearer is painted later
-  const range = v => v.reduce((r, x) => [Math.min(r[0], x), Math.max(r[1], x)], [Infinity, -Infinity]);
-  const [x0, x1] = range(xs), [y0, y1] = range(ys), width = Math.min(510, W), s = Math.min((width - 20) / Math.max(x1 - x0, 1e-9), 490 / Math.max(y1 - y0, 1e-9));
-  const figure = parent.appendChild(document.createElement('figure')), c = figure.appendChild(document.createElement('canvas'));
-  const H = Math.max(30, s * (y1 - y0) + 20), scale = Math.max(2, window.devicePixelRatio || 1);
-  c.width = width * scale; c.height = H * scale; c.style.width = width + 'px'; c.style.height = H + 'px';
-  const g = c.getContext('2d'); g.scale(scale, scale);
-  const px = i => width / 2 + s * (xs[i] - (x0 + x1) / 2), py = i => H / 2 - s * (ys[i] - (y0 + y1) / 2);
-  const shade = vertices => { const known = vertices.map(v => values[v]).filter(v => v !== null);
-    return known.length ? ramp(known.reduce((a, v) => a + v, 0) / known.length) : 'rgba(128,140,150,.22)'; };
-  faces.forEach(([, f]) => { g.beginPath(); f.forEach((v, k) => k ? g.lineTo(px(v), py(v)) : g.moveTo(px(v), py(v))); g.closePath();
-    g.fillStyle = shade(f); g.fill(); g.strokeStyle = 'rgba(90,100,110,.25)'; g.lineWidth = .5; g.stroke(); });
-  (b.edges || []).forEach(e => { g.beginPath(); g.moveTo(px(e[0]), py(e[0])); g.lineTo(px(e[1]), py(e[1]));
-    g.strokeStyle = shade(e); g.lineWidth = 4; g.stroke(); });
-  const text = figure.appendChild(document.createElement('figcaption')), bar = document.createElement('span');
-  bar.className = 'scale'; bar.style.background = low === high ? ramp(ramp === early ? 0 : 1) : gradient;
-  text.append(caption + (below === undefined ? '' : below ? ', seen from below' : ', seen from above') + ': ');
-  text.append(...low === high ? [bar, low] : [low, bar, high]);  // one value alone has no scale
-}
-const FEW_VERTICES = 20;  // as of a box: that one of them touched says no place
-const heat = document.getElementById('heat'), sentence = text => { heat.appendChild(document.createElement('p')).textContent = text; };
-const touched = b => b.count.some(c => c), untouched = R.bodies.filter(b => !touched(b)).map(b => b.name);
-R.bodies.filter(touched).forEach(b => {
-  const most = Math.max(...b.count), times = b.first.filter(t => t !== null);
-  sentence(`${b.name}: ${b.flat.length} vertices, ${b.count.filter(c => c).length} of them in contact at some time`);
-  if (b.flat.length < FEW_VERTICES) return;
-  const row = heat.appendChild(document.createElement('div')), sides = turnsOver(b) ? [false, true] : [undefined]; row.className = 'maps';
-  sides.forEach(below => map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), many, FEW_TO_MANY, 'contacts of a vertex (logarithmic)', '1', String(most), below));
-  if (!times.length) return;
-  const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
-  sides.forEach(below => map(row, b, b.first.map(t => t === null ? null : t1 > t0 ? (t - t0) / (t1 - t0) : 0), early, EARLY_TO_LATE, 'first contact, early to late', number(t0) + ' s', number(t1) + ' s', below));
-});
-if (untouched.length) sentence('Never in contact: ' + untouched.join(', '));
+table('touched', ['body', 'vertices', 'touched at some time', 'most often', 'first touch [s]'], R.bodies.map(b => [
+  b.name, b.count.length, b.count.filter(n => n).length, b.count.reduce((most, n) => Math.max(most, n), 0),
+  b.first.reduce((least, t) => least === null || (t !== null && t < least) ? t : least, null)]));
 const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'vertices could not be checked, or left the path',
   DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
 const STAGE = { record: 'takes in the frames', bounds: 'boxes of what the features sweep', broad_phase: 'pairs whose boxes meet',

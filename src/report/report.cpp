@@ -9,7 +9,6 @@
 
 #include "dccd/assurance.h"
 #include "dccd/contact_fields.h"
-#include "report/flat_layout.h"
 #include "report/words.h"
 
 namespace dccd {
@@ -159,11 +158,9 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     BodyHeat& heat = heat_[b];
     const auto& topology = outcome.step->bodies[b].topology;
-    if (!topology || (!heat.mesh.is_null() && heat.contacts.size() == topology->vertexCount())) continue;
+    if (!topology || heat.contacts.size() == topology->vertexCount()) continue;
     // A body whose topology changed begins anew: its vertices are other ones.
-    heat.mesh = {{"name", bodies[b].name}, {"flat", flatLayout(*outcome.step->bodies[b].t0)}};
-    heat.mesh["faces"] = topology->faces();
-    if (!topology->hasFaces()) heat.mesh["edges"] = topology->edges();
+    heat.name = bodies[b].name;
     heat.contacts.assign(topology->vertexCount(), 0);
     heat.first_s.assign(topology->vertexCount(), std::numeric_limits<double>::infinity());
   }

@@ -55,7 +55,7 @@ class Report {
 
  private:
   struct BodyHeat {
-    nlohmann::json mesh;                  // name, layout of the first answered step, faces or edges
+    std::string name;
     std::vector<std::uint32_t> contacts;  // per vertex
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
   };

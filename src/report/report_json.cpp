@@ -97,10 +97,8 @@ std::string Report::headline(bool reasons) const {
 nlohmann::json Report::heatJson() const {
   nlohmann::json bodies = nlohmann::json::array();
   for (const BodyHeat& h : heat_) {
-    if (h.mesh.is_null()) continue;
-    nlohmann::json body = h.mesh;
-    body["first"] = nlohmann::json::array();
-    body["count"] = h.contacts;
+    if (h.contacts.empty()) continue;
+    nlohmann::json body = {{"name", h.name}, {"count", h.contacts}, {"first", nlohmann::json::array()}};
     for (double f : h.first_s) body["first"].push_back(finiteOrNull(f));
     bodies.push_back(std::move(body));
   }
