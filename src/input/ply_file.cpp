@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <memory>
 
 #include "input/ply_header.h"
 #include "input/text_lines.h"
@@ -19,90 +18,40 @@ std::size_t bytesOf(Number type) {
   return BYTES[static_cast<std::size_t>(type)];
 }
 
-/// The rows of the elements, value by value.
+/// The rows of the elements, value by value: words, where a row is a line, or bytes.
 class PlyBody {
  public:
-  virtual ~PlyBody() = default;
+  /// `bytes`: behind the head.
+  PlyBody(TextLines& lines, std::string_view bytes, Encoding encoding, const std::string& path)
+      : lines_(lines),
+        rest_(bytes),
+        is_text_(encoding == Encoding::ASCII),
+        swap_(encoding == Encoding::BIG_ENDIAN_BYTES),
+        path_(path) {}
+
   /// `what` outlives the row.
-  virtual void beginRow(std::string_view what, std::uint64_t number) {
+  void beginRow(std::string_view what, std::uint64_t number) {
     what_ = what;
     number_ = number;
-  }
-  virtual void endRow() = 0;
-  virtual double number(Number type) = 0;
-  /// Of a type that is an integer.
-  virtual std::int64_t integer(Number type) = 0;
-  virtual void skip(Number type, std::uint64_t count) = 0;
-  virtual bool holds(Number type, std::uint64_t count) const = 0;
-  [[noreturn]] virtual void fail(const std::string& what) const = 0;
-  /// After the last row. A remark, or nothing.
-  virtual std::string finish() = 0;
-
- protected:
-  /// "polygon 3", for messages.
-  std::string row() const { return std::string(what_) + " " + std::to_string(number_); }
-
- private:
-  std::string_view what_;
-  std::uint64_t number_ = 0;
-};
-
-/// A row is a line.
-class PlyText : public PlyBody {
- public:
-  explicit PlyText(TextLines& lines) : lines_(lines) {}
-
-  void beginRow(std::string_view what, std::uint64_t number) override {
-    PlyBody::beginRow(what, number);
-    if (!lines_.nextWithWords()) lines_.fail("the file ends before " + row());
     next_ = 0;
+    if (is_text_ && !lines_.nextWithWords()) lines_.fail("the file ends before " + row());
   }
-  void endRow() override {
-    if (next_ < lines_.words().size()) lines_.fail(lines_.words()[next_], "is more than " + row() + " has");
+  void endRow() {
+    if (is_text_ && next_ < lines_.words().size()) lines_.fail(lines_.words()[next_], "is more than " + row() + " has");
   }
-  double number(Number type) override {
-    const TextWord& word = take();
-    if (isInteger(type)) return static_cast<double>(lines_.integer(word));
+  double number(Number type) {
+    if (isInteger(type)) return static_cast<double>(integer(type));
+    if (!is_text_) return type == Number::FLOAT ? double{take<float>()} : take<double>();
+    const TextWord& word = takeWord();
     const double value = lines_.number(word);
     if (type == Number::DOUBLE || !std::isfinite(value)) return value;
     // Up to half a unit in the last place above the largest float it is rounded to that.
     if (std::abs(value) >= 0x1.ffffffp127) lines_.fail(word, "is too large for a float");
     return double{static_cast<float>(value)};
   }
-  std::int64_t integer(Number) override { return lines_.integer(take()); }
-  void skip(Number, std::uint64_t count) override {
-    for (; count > 0; --count) take();
-  }
-  bool holds(Number, std::uint64_t count) const override { return count <= lines_.words().size() - next_; }
-  [[noreturn]] void fail(const std::string& what) const override { lines_.fail(row() + " " + what); }
-  std::string finish() override {
-    if (lines_.nextWithWords()) {
-      lines_.fail(lines_.words()[0], "stands after all that the header counts: its counts are too low");
-    }
-    return {};
-  }
-
- private:
-  const TextWord& take() {
-    if (next_ == lines_.words().size()) lines_.fail(row() + " has too few values in its line");
-    return lines_.words()[next_++];
-  }
-  TextLines& lines_;
-  std::size_t next_ = 0;
-};
-
-class PlyBytes : public PlyBody {
- public:
-  PlyBytes(std::string_view rest, bool big_endian, const std::string& path)
-      : rest_(rest), swap_(big_endian), path_(path) {}
-
-  void endRow() override {}
-  double number(Number type) override {
-    if (type == Number::FLOAT) return double{take<float>()};
-    if (type == Number::DOUBLE) return take<double>();
-    return static_cast<double>(integer(type));
-  }
-  std::int64_t integer(Number type) override {
+  /// Of a type that is an integer.
+  std::int64_t integer(Number type) {
+    if (is_text_) return lines_.integer(takeWord());
     switch (type) {
       case Number::INT8:
         return take<std::int8_t>();
@@ -118,24 +67,39 @@ class PlyBytes : public PlyBody {
         return take<std::uint32_t>();
     }
   }
-  void skip(Number type, std::uint64_t count) override {
+  void skip(Number type, std::uint64_t count) {
     if (!holds(type, count)) end();
-    rest_.remove_prefix(static_cast<std::size_t>(count) * bytesOf(type));
+    next_ += is_text_ ? count : 0;
+    rest_.remove_prefix(is_text_ ? 0 : static_cast<std::size_t>(count) * bytesOf(type));
   }
-  bool holds(Number type, std::uint64_t count) const override { return count <= rest_.size() / bytesOf(type); }
-  [[noreturn]] void fail(const std::string& what) const override {
+  bool holds(Number type, std::uint64_t count) const {
+    return count <= (is_text_ ? lines_.words().size() - next_ : rest_.size() / bytesOf(type));
+  }
+  [[noreturn]] void fail(const std::string& what) const {
+    if (is_text_) lines_.fail(row() + " " + what);
     throw MeshFileError(path_ + ": " + row() + " " + what);
   }
-  std::string finish() override {
-    if (rest_.empty()) return {};
+  /// After the last row. A remark, or nothing.
+  std::string finish() {
+    const std::string low = "all that the header counts: its counts are too low";
+    if (is_text_ && lines_.nextWithWords()) lines_.fail(lines_.words()[0], "stands after " + low);
+    if (is_text_ || rest_.empty()) return {};
     const std::string count = std::to_string(rest_.size());
     if (isPadding(rest_)) return count + " bytes of padding after the last element are skipped";
-    throw MeshFileError(path_ + ": " + count + " bytes stand after all that the header counts: its counts are too low");
+    throw MeshFileError(path_ + ": " + count + " bytes stand after " + low);
   }
 
  private:
-  [[noreturn]] void end() const { throw MeshFileError(path_ + ": the file ends in " + row()); }
-
+  /// "polygon 3", for messages.
+  std::string row() const { return std::string(what_) + " " + std::to_string(number_); }
+  [[noreturn]] void end() const {
+    if (is_text_) lines_.fail(row() + " has too few values in its line");
+    throw MeshFileError(path_ + ": the file ends in " + row());
+  }
+  const TextWord& takeWord() {
+    if (next_ == lines_.words().size()) end();
+    return lines_.words()[next_++];
+  }
   template <typename T>
   T take() {
     char bytes[sizeof(T)];
@@ -148,9 +112,13 @@ class PlyBytes : public PlyBody {
     return value;
   }
 
+  TextLines& lines_;
   std::string_view rest_;
-  bool swap_;
+  bool is_text_, swap_;
   const std::string& path_;
+  std::string_view what_;
+  std::uint64_t number_ = 0;
+  std::size_t next_ = 0;  // of a line's words
 };
 
 class PlyReader {
@@ -161,19 +129,19 @@ class PlyReader {
   MeshFile read() {
     requireMesh();
     vertices_ = elementNamed("vertex")->count;
-    const std::unique_ptr<PlyBody> body = openBody();
+    PlyBody body(lines_, bytesOfBody(), *header_.encoding, path_);
     for (const Element& element : header_.elements) {
       if (element.name == "vertex") {
-        readVertices(element, *body);
+        readVertices(element, body);
       } else if (element.name == "face" || element.name == "tristrips") {
-        readPolygons(element, *body);
+        readPolygons(element, body);
       } else if (element.name == "edge" && !hasFaces()) {
-        readEdges(element, *body);
+        readEdges(element, body);
       } else {
-        skip(element, *body);
+        skip(element, body);
       }
     }
-    if (std::string remark = body->finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
+    if (std::string remark = body.finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
     setPolygons(std::move(polygons_), mesh_);
     const auto name = [begin = faces_begin_, end = faces_end_, strips = std::move(strip_ends_)](std::size_t p) {
       if (p >= begin && p < end) return "polygon " + std::to_string(p - begin);
@@ -203,16 +171,13 @@ class PlyReader {
     }
   }
 
-  std::unique_ptr<PlyBody> openBody() {
-    if (header_.encoding == Encoding::ASCII) return std::make_unique<PlyText>(lines_);
-    std::string_view rest = lines_.rest();
+  std::string_view bytesOfBody() const {
+    const std::string_view rest = lines_.rest();
     // Where lines end with CR alone, a line feed after the header's last one is a byte of the body.
     const std::size_t first_end = bytes_.find('\r'), at = bytes_.size() - rest.size();
     const bool by_cr = first_end < bytes_.find('\n') && bytes_[first_end + 1] != '\n';
-    if (by_cr && at >= 2 && bytes_[at - 2] == '\r' && bytes_[at - 1] == '\n') {
-      rest = std::string_view(bytes_).substr(at - 1);
-    }
-    return std::make_unique<PlyBytes>(rest, header_.encoding == Encoding::BIG_ENDIAN_BYTES, path_);
+    const bool is_first = by_cr && at >= 2 && bytes_[at - 2] == '\r' && bytes_[at - 1] == '\n';
+    return is_first ? std::string_view(bytes_).substr(at - 1) : rest;
   }
 
   static std::string_view rowName(const Element& element) {
@@ -230,17 +195,20 @@ class PlyReader {
     return static_cast<std::uint64_t>(count);
   }
 
-  template <typename Take>
-  void forRows(const Element& element, PlyBody& body, Take take) {
+  /// Calls take(p) for each property of each row, and after each row done().
+  template <typename Take, typename Done>
+  void forRows(const Element& element, PlyBody& body, Take take, Done done) {
     for (std::uint64_t row = 0; row < element.count; ++row) {
       body.beginRow(rowName(element), row);
       for (std::size_t p = 0; p < element.properties.size(); ++p) take(p);
       body.endRow();
+      done();
     }
   }
 
   void skip(const Element& element, PlyBody& body) {
-    forRows(element, body, [&](std::size_t p) { skipValue(element.properties[p], body); });
+    forRows(
+        element, body, [&](std::size_t p) { skipValue(element.properties[p], body); }, [] {});
     if (element.count == 0) return;
     mesh_.remarks.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) +
                             ") is skipped");
@@ -263,19 +231,12 @@ class PlyReader {
     std::vector<int> axis_of(element.properties.size(), -1);
     int axis = 0;
     for (const std::string_view name : {"x", "y", "z"}) axis_of[propertyOf(element, {name}, false)] = axis++;
-    for (std::uint64_t row = 0; row < element.count; ++row) {
-      Vec3 p = Vec3::Zero();
-      body.beginRow(rowName(element), row);
-      for (std::size_t i = 0; i < element.properties.size(); ++i) {
-        if (axis_of[i] < 0) {
-          skipValue(element.properties[i], body);
-        } else {
-          p[axis_of[i]] = body.number(element.properties[i].type);
-        }
-      }
-      body.endRow();
-      mesh_.positions.push_back(p);
-    }
+    Vec3 at = Vec3::Zero();
+    const auto take = [&](std::size_t p) {
+      if (axis_of[p] < 0) return skipValue(element.properties[p], body);
+      at[axis_of[p]] = body.number(element.properties[p].type);
+    };
+    forRows(element, body, take, [&] { mesh_.positions.push_back(at); });
   }
 
   Index vertexOf(std::int64_t v, const PlyBody& body) const {
@@ -299,7 +260,7 @@ class PlyReader {
     const std::size_t list = propertyOf(element, {"vertex_indices", "vertex_index"}, true);
     const bool strips = element.name == "tristrips";
     if (!strips) faces_begin_ = polygons_.size();
-    forRows(element, body, [&](std::size_t i) {
+    const auto take = [&](std::size_t i) {
       const Property& property = element.properties[i];
       if (i != list) return skipValue(property, body);
       corners_.clear();
@@ -317,7 +278,8 @@ class PlyReader {
       } else {
         polygons_.add(corners_);
       }
-    });
+    };
+    forRows(element, body, take, [] {});
     if (!strips) faces_end_ = polygons_.size();
   }
 
@@ -325,23 +287,17 @@ class PlyReader {
   void readEdges(const Element& element, PlyBody& body) {
     const std::size_t ends[] = {propertyOf(element, {"vertex1"}, false), propertyOf(element, {"vertex2"}, false)};
     std::int64_t vertex[2] = {};
-    for (std::uint64_t row = 0; row < element.count; ++row) {
-      body.beginRow(rowName(element), row);
-      for (std::size_t p = 0; p < element.properties.size(); ++p) {
-        const Property& property = element.properties[p];
-        if (p != ends[0] && p != ends[1]) {
-          skipValue(property, body);
-        } else if (isInteger(property.type)) {
-          vertex[p == ends[1]] = body.integer(property.type);
-        } else {
-          body.fail("numbers its vertices by a type that is no integer");
-        }
-      }
-      body.endRow();
+    const auto take = [&](std::size_t p) {
+      const Property& property = element.properties[p];
+      if (p != ends[0] && p != ends[1]) return skipValue(property, body);
+      if (!isInteger(property.type)) body.fail("numbers its vertices by a type that is no integer");
+      vertex[p == ends[1]] = body.integer(property.type);
+    };
+    forRows(element, body, take, [&] {
       const Index a = vertexOf(vertex[0], body), b = vertexOf(vertex[1], body);
       if (a == b) body.fail("names vertex " + std::to_string(a) + " twice");
       mesh_.edges.push_back({std::min(a, b), std::max(a, b)});
-    }
+    });
   }
 
   const std::string& bytes_;
