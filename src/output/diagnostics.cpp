@@ -33,7 +33,6 @@ void Diagnostics::add(const Outcome& outcome, double latency_s) {
   ++outcomes_;
   answers_ += outcome.answered;
   worst_latency_s_ = std::max(worst_latency_s_, latency_s);
-  if (latency_s > 0) latency_.add(latency_s);
   status_ = outcome.status;
   reason_ = outcome.reason;
   if (!outcome.answered) return;
@@ -69,15 +68,6 @@ void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, cons
   if (!hint.empty()) raise(DiagnosticStatus::WARN, hint);
 }
 
-/// A recorded run has none: nobody waited.
-void Diagnostics::putLatency(DiagnosticStatus& status) const {
-  if (latency_.count() == 0) return;
-  putValue(status, "worst latency [s]", worst_latency_s_);
-  putValue(status, "latency since start: median [s]", latency_.quantile(0.5));
-  putValue(status, "latency since start: p99 [s]", latency_.quantile(0.99));
-  putValue(status, "latency since start: worst [s]", latency_.worst());
-}
-
 bool Diagnostics::isDue(std::int64_t now_ns) const { return now_ns - last_ns_ >= PERIOD_NS; }
 
 diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ros::Time& stamp,
@@ -95,7 +85,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   dropped_before_ = dropped;
   putValue(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
   putValue(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
-  putLatency(status);
+  if (worst_latency_s_ > 0) putValue(status, "worst latency [s]", worst_latency_s_);  // of a recorded run nobody waited
   putValue(status, "frames received", context.frames.received);
   putValue(status, "frames processed", context.frames.processed());
   putValue(status, "frames started anew", context.frames.started());

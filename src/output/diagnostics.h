@@ -8,8 +8,6 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/time.h>
 
-#include "output/latency_histogram.h"
-
 namespace dccd {
 
 constexpr const char* DIAGNOSTICS_TOPIC = "/diagnostics";
@@ -32,7 +30,6 @@ class Diagnostics {
  private:
   void judge(diagnostic_msgs::DiagnosticStatus& status, bool drops, bool enabled, const std::string& map_topic,
              const std::string& hint) const;
-  void putLatency(diagnostic_msgs::DiagnosticStatus& status) const;
 
   std::string name_;
   std::int64_t last_ns_ = 0;
@@ -40,7 +37,6 @@ class Diagnostics {
   std::uint64_t outcomes_ = 0, answers_ = 0;
   double worst_latency_s_ = 0;
   std::uint64_t dropped_before_ = 0;  // frames dropped in all, at the last status
-  LatencyHistogram latency_;          // since the start
   // Of the newest outcome.
   StepStatus status_ = StepStatus::FIRST_FRAME;
   std::string reason_;
