@@ -269,8 +269,12 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
       ParameterReader one = section.section(name);
       readBody(one, name, name, config);
       one.finish();
+      const bool rigid_off = settingOf(config.effects, Effect::RIGID_BODIES) == EffectSetting::OFF;
+      if (!rigid_off || !config.bodies.back().isRigid()) continue;
+      config.rigid_off.push_back(name);
+      config.bodies.pop_back();
     }
-    if (config.bodies.empty()) reader.fail("bodies", "is empty");
+    if (section.names().empty()) reader.fail("bodies", "is empty");
   }
   const auto has_clock = [&](const BodyConfig& body) {
     return !body.isRigid() && body.body.motion == BodyMotionKind::STREAM && (clock.empty() || clock == body.body.name);

@@ -147,42 +147,6 @@ void readClearance(ParameterReader section, MonitorConfig& config) {
   section.finish();
 }
 
-/// Their files are not read, their frames not asked for.
-void removeRigidBodies(MonitorConfig& config) {
-  const std::string clock = config.bodies[config.monitor.clock_body].body.name;
-  std::vector<std::uint16_t> moved_to;  // new indices, for what names bodies by theirs
-  std::vector<BodyConfig> kept;
-  for (BodyConfig& body : config.bodies) {
-    moved_to.push_back(body.isRigid() ? OBSTACLE_BODY : static_cast<std::uint16_t>(kept.size()));
-    if (!body.isRigid()) kept.push_back(std::move(body));
-  }
-  config.bodies = std::move(kept);
-  /// Gives what names a body the new index; false where that body is gone.
-  const auto moves = [&](auto& names) {
-    if (names.body == OBSTACLE_BODY) return true;
-    names.body = moved_to[names.body];
-    return names.body != OBSTACLE_BODY;
-  };
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    if (config.bodies[b].body.name == clock) config.monitor.clock_body = b;
-    std::vector<SeparationFrom> separations;
-    for (SeparationFrom from : config.bodies[b].body.separations) {
-      if (moves(from)) separations.push_back(from);
-    }
-    config.bodies[b].body.separations = std::move(separations);
-  }
-  std::vector<Expectation> expected;
-  std::vector<std::size_t> entry;
-  for (std::size_t e = 0; e < config.expected_contacts.size(); ++e) {
-    Expectation& one = config.expected_contacts[e];
-    if (!moves(one.partners[0]) || !moves(one.partners[1])) continue;
-    expected.push_back(std::move(one));
-    entry.push_back(config.expected_entry[e]);
-  }
-  config.expected_contacts = std::move(expected);
-  config.expected_entry = std::move(entry);
-}
-
 /// What an effect that is off takes away before a step is made, so that no body of a step tells of it. What bodies tell
 /// of (self_collision, body_body, octomap) is not named twice.
 std::vector<std::string> takenAway(const MonitorConfig& config) {
@@ -192,9 +156,7 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
     sentences.push_back(what + " by effects/" + toString(effect) + ": off");
   };
   std::string rigid;
-  for (const BodyConfig& body : config.bodies) {
-    if (body.isRigid()) rigid += (rigid.empty() ? "rigid body '" : "', '") + body.body.name;
-  }
+  for (const std::string& name : config.rigid_off) rigid += (rigid.empty() ? "rigid body '" : "', '") + name;
   const auto uncertain = [](const BodyConfig& body) { return body.isUncertain(); };
   const bool any_uncertain = std::any_of(config.bodies.begin(), config.bodies.end(), uncertain);
   add(Effect::RIGID_BODIES, rigid.empty() ? "" : rigid + "'");
@@ -208,7 +170,6 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
 void applyEffects(MonitorConfig& config) {
   config.monitor.detector.excluded = takenAway(config);
   const auto off = [&](Effect effect) { return settingOf(config.effects, effect) == EffectSetting::OFF; };
-  if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {
     if (off(Effect::SELF_COLLISION)) body.body.self_collision = false;

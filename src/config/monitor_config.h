@@ -67,6 +67,8 @@ struct MonitorConfig {
   std::string fixed_frame;         ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;  ///< the robot's links come last
   bool bodies_listed = false;      ///< under bodies/, each with its own topic
+  /// Bodies that effects/rigid_bodies leaves out: their files are not read, their frames not asked for.
+  std::vector<std::string> rigid_off;
   Robot robot;
   RobotConfig robot_asked;                  ///< what it was made of
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each

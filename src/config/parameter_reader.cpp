@@ -194,17 +194,6 @@ std::vector<unsigned> ParameterReader::indices(const std::string& name) {
   return result;
 }
 
-std::vector<std::string> ParameterReader::texts(const std::string& name, std::size_t count) {
-  const std::string what = "a list of " + std::to_string(count) + " texts, such as [cloth, finger]";
-  const ParameterTree& list = needed(name, what);
-  std::vector<std::string> result;
-  for (const ParameterTree& item : list.items) {
-    if (item.kind == Kind::TEXT) result.push_back(item.text);
-  }
-  if (result.size() != count || list.items.size() != count) fail(name, "must be " + what);
-  return result;
-}
-
 std::vector<ParameterTree> ParameterReader::list(const std::string& name) {
   const ParameterTree& value = raw(name);
   if (!value.isSet()) return {};

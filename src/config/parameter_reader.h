@@ -46,8 +46,6 @@ class ParameterReader {
   std::vector<int> integers(const std::string& name, int min, int max);
   /// Vertex indices; empty where nothing is set.
   std::vector<unsigned> indices(const std::string& name);
-  /// Exactly `count` texts.
-  std::vector<std::string> texts(const std::string& name, std::size_t count);
   /// The list's items, or none when it is not set.
   std::vector<ParameterTree> list(const std::string& name);
   /// The same where each item is a section.

@@ -210,6 +210,7 @@ void readRobot(ParameterReader& reader, const RobotLoader& load, MonitorConfig& 
 std::optional<std::vector<std::uint16_t>> bodiesNamed(const std::string& name, const MonitorConfig& config) {
   const Robot& robot = config.robot;
   std::vector<std::uint16_t> found;
+  if (contains(config.rigid_off, name)) return found;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     const BodyConfig& body = config.bodies[b];
     const bool whole_link = !body.link.empty() && (name == body.link || name == LINK + body.link);

@@ -84,8 +84,8 @@ using RobotLoader = std::function<Robot(const RobotConfig&, double tolerance_m)>
 void readRobot(ParameterReader& reader, const RobotLoader& load, MonitorConfig& config);
 
 /// What a name in `between` stands for: numbers of bodies. "link NAME", "group NAME", or NAME alone, be it a body or a
-/// link. None: a link or group without geometry that is watched, or of a robot that could not be read. nullopt: nothing
-/// that is known.
+/// link. None: a link or group without geometry that is watched, or of a robot that could not be read; a rigid body
+/// that effects leave out. nullopt: nothing that is known.
 std::optional<std::vector<std::uint16_t>> bodiesNamed(const std::string& name, const MonitorConfig& config);
 
 }  // namespace dccd
