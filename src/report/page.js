@@ -96,10 +96,6 @@ document.getElementById('headline').textContent = R.headline;
     const top = a.y(Math.min(n, s.contacts));
     if (n && s.contacts) el('title', {}, el('rect', { x: a.x(s.t) - a.bar / 2, y: top, width: a.bar, height: a.y(0) - top, fill }, a.svg),
       `step ${s.step}: ${s.contacts} contacts, ${s.undecided} undecided, ${s.initial} initial`); })); }
-{ const a = axes('toc', 180, 1, 'earliest TOC');
-  R.steps.forEach(s => [[s.toc, '#9aa4b0'], [s.toc_new, '#2a6fb0']].forEach(([toc, fill]) => {
-    if (toc === null || toc > 1) return;
-    el('title', {}, el('circle', { cx: a.x(s.t), cy: a.y(toc), r: 2.8, fill }, a.svg), `step ${s.step}: ${toc}`); })); }
 { const a = axes('latency', 180, Math.max(1e-3, ...R.steps.map(s => s.ms)), 'ms');
   el('polyline', { points: R.steps.filter(s => s.answered).map(s => `${a.x(s.t)},${a.y(s.ms)}`).join(' '), fill: 'none',
     stroke: '#2a6fb0', 'stroke-width': 1.3 }, a.svg);

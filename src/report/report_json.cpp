@@ -1,7 +1,6 @@
 // What the report says of all steps together: the headline, report.json, and the data of the page.
 #include <cmath>
 #include <iomanip>
-#include <limits>
 #include <numeric>
 #include <sstream>
 
@@ -28,10 +27,6 @@ nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json
 }  // namespace
 
 void Report::addRow(const Outcome& o) {
-  double earliest_new = std::numeric_limits<double>::infinity();
-  for (const Contact& c : o.contacts) {
-    if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
-  }
   const double time_s = secondsBetween(origin_ns_, o.stamp_ns);
   const nlohmann::json row = {{"step", o.sequence},
                               {"t", time_s},
@@ -43,8 +38,6 @@ void Report::addRow(const Outcome& o) {
                               {"contacts", o.total_contacts},
                               {"undecided", o.counts.undecided},
                               {"initial", o.counts.initial},
-                              {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
-                              {"toc_new", finiteOrNull(earliest_new)},
                               {"ms", o.stats.total_ms}};
   if (!rows_.empty()) rows_ += ",\n";
   rows_ += toText(row, -1);

@@ -71,7 +71,7 @@ class ReportPageTest(FolderTestCase):
     def test_draws_in_a_browser(self):
         body, console = self.dom()
         self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
-        for name, least in (('contacts', 10), ('toc', 10), ('study_plot', 15)):
+        for name, least in (('contacts', 10), ('study_plot', 15)):
             drawn = body[body.index('id="%s"' % name):].split('</svg>')[0]
             self.assertGreater(len(re.findall(r'<(?:rect|circle)\b', drawn)), least, name)
         self.assertIn('<polyline', body)
