@@ -250,6 +250,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   const LoadedMap& refused = trusted_map_ && !trusted_map_->surface ? *trusted_map_ : *unplaced_map_;
   if (!refused.surface) {
     // What was there before is out of date, and no map is better than a wrong one.
+    if (!config_.takesClouds()) monitor_->missMap();  // a cloud that was left out is in no map
     monitor_->setMap(noMap(refused.problem));
     settled_map_ns_ = unplaced_map_->arrival_ns;
     unplaced_map_.reset();
@@ -263,6 +264,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   const bool placed = findPlace(*unplaced_map_, map, reason);
   const std::string frame = map.frame_id;
   if (placed) {
+    if (std::exchange(unplaced_map_->after_missed, false)) monitor_->missMap();
     monitor_->setMap(std::move(map));
     lookBack(OBSTACLE_BODY, frame, fixed_frame_);
     settled_map_ns_ = unplaced_map_->arrival_ns;
