@@ -135,16 +135,20 @@ class PlyReader {
         readVertices(element, body);
       } else if (element.name == "face" || element.name == "tristrips") {
         readPolygons(element, body);
-      } else if (element.name == "edge" && !hasFaces()) {
+      } else if (element.name == "edge") {
         readEdges(element, body);
       } else {
         skip(element, body);
       }
     }
     if (std::string remark = body.finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
+    const std::size_t edges_begin = polygons_.size();
+    if (hasFaces()) makePolygonsOfEdges();
     setPolygons(std::move(polygons_), mesh_);
-    const auto name = [begin = faces_begin_, end = faces_end_, strips = std::move(strip_ends_)](std::size_t p) {
+    const auto name = [edges_begin, begin = faces_begin_, end = faces_end_,
+                       strips = std::move(strip_ends_)](std::size_t p) {
       if (p >= begin && p < end) return "polygon " + std::to_string(p - begin);
+      if (p >= edges_begin) return "edge " + std::to_string(p - edges_begin);
       const auto strip = std::upper_bound(strips.begin(), strips.end(), p) - strips.begin();
       return "a triangle of strip " + std::to_string(strip);
     };
@@ -283,7 +287,12 @@ class PlyReader {
     if (!strips) faces_end_ = polygons_.size();
   }
 
-  /// Of ropes: without faces. Beside them edges say nothing that the faces do not.
+  /// As of an OBJ's lines: beside faces an edge is unchecked, unless a face has it.
+  void makePolygonsOfEdges() {
+    for (const Edge& edge : mesh_.edges) polygons_.add({edge[0], edge[1]});
+    mesh_.edges.clear();
+  }
+
   void readEdges(const Element& element, PlyBody& body) {
     const std::size_t ends[] = {propertyOf(element, {"vertex1"}, false), propertyOf(element, {"vertex2"}, false)};
     std::int64_t vertex[2] = {};

@@ -316,12 +316,11 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
 
   rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
-  ros::Time first_map;
+  bool first_is_taken = false;
   if (bag_maps && !config_.takesClouds() && maps.size() > 0) {
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
-    const rosbag::MessageInstance& first = *at_first;
-    first_map = first.getTime();
-    run.setMap(readMap(first, config_, run.memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
+    run.setMap(readMap(*at_first, config_, run.memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
+    first_is_taken = true;
   }
 
   TransformWindow transforms(run.bag, run.feed);
@@ -343,7 +342,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     if (is_mesh) {
       for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
     }
-    if (bag_maps && m.getTopic() == map_topic && at > first_map) run.mapMessage(m);
+    const bool is_map = bag_maps && m.getTopic() == map_topic;
+    if (is_map && !std::exchange(first_is_taken, false)) run.mapMessage(m);
     run.placeCloud(at);
     progress.advance();
   }

@@ -12,6 +12,10 @@ namespace {
 
 constexpr std::chrono::milliseconds POLL{2};  // of tf, where a cloud waits for it
 
+// Where bodies have own voxels each map is to be looked at: that many may be finished while the worker is in a step,
+// and take a share of max_map_mb each at the most. Else the newest alone counts.
+constexpr std::size_t MOST_FINISHED = 4, SHARE_OF_FINISHED = 32;
+
 }  // namespace
 
 MapLoader::MapLoader(const MonitorConfig& config, const TransformFeed& transforms, std::function<void()> ready)
@@ -33,6 +37,7 @@ void MapLoader::put(Job job) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!isBusy()) busy_since_ns_ = job.arrival_ns;
+    job.after_missed = job_ && !config_.takesClouds();  // a cloud that was left out is in no map
     job_ = std::move(job);
   }
   changed_.notify_one();
@@ -76,9 +81,9 @@ LoadedMap MapLoader::load(const Job& job) {
 
 bool MapLoader::take(LoadedMap& map) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!done_) return false;
-  map = std::move(*done_);
-  done_.reset();
+  if (done_.empty()) return false;
+  map = std::move(done_.front());
+  done_.pop_front();
   return true;
 }
 
@@ -86,6 +91,14 @@ std::optional<std::int64_t> MapLoader::busySince() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!isBusy()) return std::nullopt;
   return busy_since_ns_;
+}
+
+/// The mutex is held.
+void MapLoader::keep(LoadedMap map) {
+  const bool is_small = !map.surface || map.surface->memoryBytes() <= config_.max_map_bytes / SHARE_OF_FINISHED;
+  const std::size_t most = config_.ownsVoxels() && is_small ? MOST_FINISHED : 1;
+  for (; done_.size() >= most; done_.pop_back()) map.after_missed = true;
+  done_.push_back(std::move(map));
 }
 
 void MapLoader::loop() {
@@ -102,11 +115,12 @@ void MapLoader::loop() {
     LoadedMap map = load(job);
     map.arrival_ns = job.arrival_ns;
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
+    map.after_missed = job.after_missed;
     if (!map.surface) ++refused_;
     last_ = map.surface;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      done_ = std::move(map);
+      keep(std::move(map));
       decoding_ = false;
     }
     ready_();

@@ -1,10 +1,11 @@
 // Octomaps are decoded, or made of clouds, and their surface is built on a thread of its own; the worker swaps the
-// finished one in between steps. Of several that wait, only the newest is worth decoding.
+// finished one in between steps. Of several that wait, only the newest is decoded.
 #pragma once
 
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -49,7 +50,7 @@ class MapLoader {
   void refuse(const std::string& problem, std::int64_t arrival_ns);
   /// A cloud waits until the fixed frame is known. From any thread.
   void setFixedFrame(const std::string& frame);
-  /// The newest finished map, once.
+  /// The oldest finished map, once.
   bool take(LoadedMap& map);
 
   /// When the first of the maps came that are on their way, that wait to be decoded, are being decoded or can be taken;
@@ -66,6 +67,7 @@ class MapLoader {
     StampNs receipt_ns = 0;
     std::int64_t arrival_ns = 0;
     std::string problem;  // not empty: refused
+    bool after_missed = false;
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
   const MapMemory memory_{config_};
@@ -76,7 +78,7 @@ class MapLoader {
   std::condition_variable changed_;
   bool frame_known_ = false;  // and set in clouds_, which is the thread's from then on
   std::optional<Job> job_;
-  std::optional<LoadedMap> done_;
+  std::deque<LoadedMap> done_;
   bool stopping_ = false, decoding_ = false;
   std::int64_t busy_since_ns_ = 0;
   std::atomic<std::uint64_t> received_{0}, refused_{0};
@@ -84,10 +86,11 @@ class MapLoader {
 
   /// Nothing keeps the job that there is from being begun. The mutex is held.
   bool isReady() const { return job_ && (frame_known_ || !config_.takesClouds() || !job_->problem.empty()); }
-  bool isBusy() const { return isReady() || decoding_ || done_; }
+  bool isBusy() const { return isReady() || decoding_ || !done_.empty(); }
   LoadedMap load(const Job& job);
   bool mayWait(const Job& job);
   void put(Job job);
+  void keep(LoadedMap map);
   void loop();
 };
 

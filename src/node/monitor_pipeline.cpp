@@ -162,6 +162,7 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   // What is own follows from each map, not from the newest alone.
   if (config_.ownsVoxels()) placeMap(now_ns);
   if (!unplaced_map_) unplaced_since_ns_ = now_ns;
+  map.after_missed = map.after_missed || unplaced_map_;
   unplaced_map_ = std::move(map);
 }
 

@@ -30,7 +30,8 @@ struct LoadedMap {
   StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
   std::int64_t arrival_ns = 0;                  ///< by the clock that frames' are of
   std::string problem;
-  bool trusted = false;  ///< octomap_file: nothing of it is a body's own, and it is used together with a live one
+  bool trusted = false;       ///< octomap_file: nothing of it is a body's own, and it is used together with a live one
+  bool after_missed = false;  ///< maps came before it that the pipeline was not given
 };
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions

@@ -250,6 +250,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   const LoadedMap& refused = trusted_map_ && !trusted_map_->surface ? *trusted_map_ : *unplaced_map_;
   if (!refused.surface) {
     // What was there before is out of date, and no map is better than a wrong one.
+    if (!config_.takesClouds()) monitor_->missMap();  // a cloud that was left out is in no map
     monitor_->setMap(noMap(refused.problem));
     settled_map_ns_ = unplaced_map_->arrival_ns;
     unplaced_map_.reset();
@@ -263,6 +264,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   const bool placed = findPlace(*unplaced_map_, map, reason);
   const std::string frame = map.frame_id;
   if (placed) {
+    if (std::exchange(unplaced_map_->after_missed, false)) monitor_->missMap();
     monitor_->setMap(std::move(map));
     lookBack(OBSTACLE_BODY, frame, fixed_frame_);
     settled_map_ns_ = unplaced_map_->arrival_ns;
@@ -301,11 +303,19 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   return all_known;
 }
 
-/// Steps that wait for other bodies will be answered with what is held only now.
+/// Steps that wait for other bodies will be answered with what is held only now, and the next one begins where the
+/// clock body's last frame was.
 void MonitorPipeline::lookBack(std::size_t body, const std::string& target, const std::string& source) {
-  if (target == source || clock_ns_ == 0 || !monitor_->waiting()) return;
-  const auto longest_ns = static_cast<StampNs>(config_.monitor.store.max_step_s * 1e9);
-  monitor_->seen(body, posesBetween(target, source, clock_ns_ - longest_ns, clock_ns_ + 1));
+  if (target == source || clock_ns_ == 0) return;
+  std::vector<SeenPose> seen;
+  if (monitor_->waiting()) {
+    const auto longest_ns = static_cast<StampNs>(config_.monitor.store.max_step_s * 1e9);
+    seen = posesBetween(target, source, clock_ns_ - longest_ns, clock_ns_);
+  }
+  SeenPose last{clock_ns_, {}};
+  std::string unused;
+  if (transforms_.lookup(target, source, clock_ns_, last.pose, unused)) seen.push_back(last);
+  monitor_->seen(body, seen);
 }
 
 /// Target_from_source at each stamp of tf between the two, as far back as a step may reach (from 0: not at all).

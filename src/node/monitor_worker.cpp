@@ -63,13 +63,13 @@ void CollisionMonitor::Impl::accountDropped() {
 }
 
 void CollisionMonitor::Impl::takeMaps() {
-  LoadedMap map;
-  if (!maps || !maps->take(map)) return;
-  if (!map.surface) {
-    log.complain(config.bodies.size(), "map", "refused: " + map.problem);
-    map.problem = whyRefused(map.problem, config);
+  for (LoadedMap map; maps && maps->take(map);) {
+    if (!map.surface) {
+      log.complain(config.bodies.size(), "map", "refused: " + map.problem);
+      map.problem = whyRefused(map.problem, config);
+    }
+    pipeline.setMap(std::move(map), steadyNs());
   }
-  pipeline.setMap(std::move(map), steadyNs());
 }
 
 /// A frame is answered with the map that came before it, as far as that is ready in time and the queue has room.

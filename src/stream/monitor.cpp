@@ -218,7 +218,7 @@ void Monitor::setBody(std::size_t body, Body what) {
   m.references.frames[body] = nullptr;
   m.references.topologies[body] = nullptr;
   m.held_seen[body].clear();
-  m.own_voxels.forgetBody(static_cast<std::uint16_t>(body));
+  m.forgetOwnVoxels(body);
 }
 
 StampNs Monitor::nextStart() const { return impl_->oldestStart(0); }

@@ -47,9 +47,10 @@ struct Monitor::Impl {
   /// As it was given: newer than what is known of the bodies.
   struct MapToCome {
     ObstacleMap map;
-    bool after_missed = false;  // maps came before it that there was no room for
+    bool after_missed = false;  // maps came before it that nobody looked at
   };
   std::deque<MapToCome> maps_to_come;
+  bool missed_map = false;  // since the last one that was given
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;  // of the step that is made
   std::string map_frame;     // of the last map that there was
@@ -112,6 +113,7 @@ struct Monitor::Impl {
   std::vector<TrackedBody> tracked() const;
   void takeMaps(StampNs known_until_ns);
   void limitMapsToCome();
+  void forgetOwnVoxels(std::size_t body);
   void takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked);
   void settleDoubt(Step& step, const Deadline& deadline);
   StampNs wayNeededFrom(std::size_t body, StampNs stamp_ns) const;

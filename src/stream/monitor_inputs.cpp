@@ -176,10 +176,9 @@ void Monitor::Impl::lookAtHeld(Step& step) const {
     double off_m = 0;
     std::optional<StampNs> unknown_at;
     Eigen::AlignedBox3d bounds;
-    // The end of a step alone where it has no length, as that of a question has.
-    const StampNs first_ns = std::min(step.start_ns + 1, step.stamp_ns);
+    // From its start on: what is elsewhere there moves back within the step.
     const auto end = held_seen[b].upper_bound(step.stamp_ns);
-    for (auto one = held_seen[b].lower_bound(first_ns); one != end; ++one) {
+    for (auto one = held_seen[b].lower_bound(step.start_ns); one != end; ++one) {
       if (!unknown_at && !one->second.matrix().allFinite()) unknown_at = one->first;
       if (unknown_at || one->second.matrix() == held.matrix()) continue;
       if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);

@@ -29,12 +29,13 @@ void Monitor::setMap(ObstacleMap map) {
   if (!map.frame_id.empty() && map.frame_id != std::exchange(m.map_frame, map.frame_id)) m.held_seen.back().clear();
   const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
+    if (!m.maps_to_come.empty()) m.missed_map = true;
     m.maps_to_come.clear();
     if (as_it_is) m.own_voxels.forget();
     m.map = std::move(map);
     return;
   }
-  m.maps_to_come.push_back({std::move(map)});
+  m.maps_to_come.push_back({std::move(map), std::exchange(m.missed_map, false)});
   m.limitMapsToCome();
   if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().map.stamp_ns);
 }
@@ -51,6 +52,8 @@ void Monitor::Impl::limitMapsToCome() {
     maps_to_come[1].after_missed = true;
   }
 }
+
+void Monitor::missMap() { impl_->missed_map = true; }
 
 void Monitor::setMapBeside(ObstacleMap map) { impl_->trusted = std::move(map); }
 
@@ -94,6 +97,13 @@ void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBo
   const auto start = Deadline::Clock::now();
   map = own_voxels.reduce(next, sure, bodies_tracked, options.own_voxels_lag_s, options.own_voxels_trust);
   own_voxels_ms += msSince(start);
+}
+
+/// From the next step on what was the body's own is an obstacle, as far as the map in force shows it.
+void Monitor::Impl::forgetOwnVoxels(std::size_t body) {
+  if (own_voxels.forgetBody(static_cast<std::uint16_t>(body)) && map.surface) {
+    map = own_voxels.reducedAnew(map, trusted.surface.get(), tracked(), options.own_voxels_trust);
+  }
 }
 
 /// What is in doubt matters to a step that would touch it, were it an obstacle.

@@ -88,8 +88,7 @@ void describe(const std::vector<TrackedBody>& bodies, bool trust_first, bool mis
   if (trust_first && !own.excluded.empty()) own.excluded += ", by own_voxels_doubt: trust the first map's, too";
   if (own.doubt.empty()) return;
   own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
-  own.doubt += missed ? " there in the first map after some that came faster than frames and were not looked at"
-                      : " there in the first map";
+  own.doubt += missed ? " there in the first map after some that were not looked at" : " there in the first map";
   own.doubt +=
       ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it away "
       "once, or set own_voxels_doubt: trust";
@@ -104,8 +103,10 @@ void OwnVoxelFinder::forget() {
   missed_ = false;
 }
 
-void OwnVoxelFinder::forgetBody(std::uint16_t body) {
+bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
+  const std::size_t before = own_.size();
   for (auto one = own_.begin(); one != own_.end();) one = one->second.body == body ? own_.erase(one) : std::next(one);
+  return before_ && own_.size() < before;
 }
 
 StampNs OwnVoxelFinder::pathNeededFrom(StampNs now_ns, double lag_s) const {
@@ -207,7 +208,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   const bool is_other = before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id);
   if (is_other || remembered_.size() > MOST_REMEMBERED) forget();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
-  const VoxelTree &now = map.surface->impl().tree, &sure = trusted ? trusted->impl().tree : nothing;
+  const VoxelTree& sure = trusted ? trusted->impl().tree : nothing;
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
   std::vector<ReachedCube> cubes = cubesToAsk(*map.surface, sure, reachedKeys(map, bodies, ways));
   searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes);
@@ -221,9 +222,26 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   before_ = map.surface;
   before_ns_ = map.stamp_ns;
 
-  ObstacleMap reduced = map;
-  reduced.own.looked_at = static_cast<std::uint64_t>(std::count_if(
+  ObstacleMap next = map;
+  next.own.looked_at = static_cast<std::uint64_t>(std::count_if(
       cubes.begin(), cubes.end(), [](const ReachedCube& cube) { return cube.why == ReachedCube::Why::APPEARED; }));
+  return withoutOwn(std::move(next), trusted, bodies, trust_first);
+}
+
+ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelSurface* trusted,
+                                        const std::vector<TrackedBody>& bodies, bool trust_first) {
+  ObstacleMap map = reduced;
+  map.surface = before_;
+  map.own = OwnVoxels();
+  map.own.looked_at = reduced.own.looked_at;
+  return withoutOwn(std::move(map), trusted, bodies, trust_first);
+}
+
+ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trusted,
+                                       const std::vector<TrackedBody>& bodies, bool trust_first) {
+  const double resolution_m = map.surface->resolution();
+  const VoxelTree nothing{std::vector<OccupiedLeaf>()};
+  const VoxelTree& sure = trusted ? trusted->impl().tree : nothing;
   std::vector<OwnVoxel> voxels;
   for (const auto& one : own_) voxels.push_back(one.second);
   std::sort(voxels.begin(), voxels.end(), [](const OwnVoxel& a, const OwnVoxel& b) { return a.key < b.key; });
@@ -231,20 +249,21 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (const OwnVoxel& voxel : voxels) {
     if (voxel.doubted) doubted.push_back({voxel.key, 1});
   }
-  if (!doubted.empty()) reduced.own.doubted_surface = VoxelSurface::build(resolution_m, std::move(doubted));
-  reduced.own.voxels = share(std::move(voxels));
-  describe(bodies, trust_first, doubts_missed_, reduced.own);
+  if (!doubted.empty()) map.own.doubted_surface = VoxelSurface::build(resolution_m, std::move(doubted));
+  map.own.voxels = share(std::move(voxels));
+  describe(bodies, trust_first, doubts_missed_, map.own);
   if (!own_.empty() || trusted) {
     std::vector<OccupiedLeaf> without = sure.leaves();
     for (const auto& one : own_) {
       visitUncovered(sure, {one.second.key, 1}, [&](const OccupiedLeaf& voxel) { without.push_back(voxel); });
     }
     const auto last = reduced_.lock();
-    reduced.surface =
-        nextSurface(resolution_m, leavesWithout(now, VoxelTree(without), sure.leaves()), last ? *last : *map.surface);
+    const std::shared_ptr<const VoxelSurface> given = map.surface;
+    map.surface = nextSurface(resolution_m, leavesWithout(given->impl().tree, VoxelTree(without), sure.leaves()),
+                              last ? *last : *given);
   }
-  reduced_ = reduced.surface;
-  return reduced;
+  reduced_ = map.surface;
+  return map;
 }
 
 }  // namespace dccd

@@ -39,7 +39,11 @@ class OwnVoxelFinder {
   void forget();
   /// Maps between the last one and the next were not looked at.
   void missMaps() { missed_ = true; }
-  void forgetBody(std::uint16_t body);
+  /// Whether the body had own voxels of a map that reduce() came to the end of.
+  bool forgetBody(std::uint16_t body);
+  /// What reduce() made of the last map, by what is own now.
+  ObstacleMap reducedAnew(const ObstacleMap& reduced, const VoxelSurface* trusted,
+                          const std::vector<TrackedBody>& bodies, bool trust_first);
   /// For a map of this stamp, or a later one: since when the bodies' ways are needed.
   StampNs pathNeededFrom(StampNs now_ns, double lag_s) const;
 
@@ -53,6 +57,9 @@ class OwnVoxelFinder {
   /// unknown_yet: bodies of which nothing is known as old as the map.
   void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
               const std::set<int>& unknown_yet);
+  /// The map without what is own or in doubt, with what is trusted.
+  ObstacleMap withoutOwn(ObstacleMap map, const VoxelSurface* trusted, const std::vector<TrackedBody>& bodies,
+                         bool trust_first);
 
   std::shared_ptr<const VoxelSurface> before_;  // as it was given; null: none
   StampNs before_ns_ = 0;

@@ -41,6 +41,14 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         self.assertEqual(statuses['NO_MAP'], frames, statuses)
         self.assertGreater(statuses['OK'], 2)
 
+    def test_a_map_that_came_at_the_time_of_the_first_one(self):
+        """As by a simulated clock, which stands while two are sent: the later one holds."""
+        start = self.cloths[0][2]
+        empty = copy.deepcopy(self.octomap())
+        empty.data = []
+        twins = [('/octomap_binary', empty, start), ('/octomap_binary', self.octomap(), start)]
+        self.expect_same(self.analyze('twins', self.write('twins.bag', twins + self.cloths)))
+
     def test_a_map_that_is_made_of_clouds(self):
         """A plate that a sensor at the world's origin sees below the cloth, which sinks onto it."""
         height = sum(min(v.z for v in cloth.vertices) for _, cloth, _ in (self.cloths[0], self.cloths[-1])) / 2

@@ -597,13 +597,12 @@ TEST_F(PlyGrammar, Strips) {
 }
 
 TEST_F(PlyGrammar, OtherElements) {
-  const MeshFile mesh = read(
-      "a.ply", head("element camera 1\nproperty float view_px\n" + xyz() +
-                    "element material 2\nproperty list uchar float weights\n" + faceElement() +
-                    "element edge 1\nproperty int vertex1\nproperty int vertex2\nelement none 0\nproperty int a\n") +
-                   "0.5\n" + points() + "2 0.5 0.5\n0\n" + faces() + "0 3\n");
+  const MeshFile mesh = read("a.ply", head("element camera 1\nproperty float view_px\n" + xyz() +
+                                           "element material 2\nproperty list uchar float weights\n" + faceElement() +
+                                           "element none 0\nproperty int a\n") +
+                                          "0.5\n" + points() + "2 0.5 0.5\n0\n" + faces());
   expectTwo(mesh, "skipped");
-  ASSERT_EQ(mesh.remarks.size(), 3u);
+  ASSERT_EQ(mesh.remarks.size(), 2u);
   EXPECT_TRUE(mentions(mesh.remarks[1], "'material' (2)")) << mesh.remarks[1];
 }
 
@@ -621,6 +620,15 @@ TEST_F(PlyGrammar, Edges) {
   expectRefused("a.ply", edges("0 0 1\n2 0 2\n"), "a.ply:19: ", "edge 1 names vertex 2 twice");
   expectRefused("a.ply", edges("0 0 1\n", "float"), "a.ply:18: ", "no integer");
   expectRefused("a.ply", head(xyz() + "element edge 1\nproperty int a\n") + points() + "0\n", "a.ply: ", "'vertex1'");
+}
+
+// As it is written for what is drawn of a mesh without faces, a strut from corner to corner.
+TEST_F(PlyGrammar, EdgesBesideFaces) {
+  const std::string edge = "element edge 3\nproperty int vertex1\nproperty int vertex2\n", rows = "1 0\n0 3\n2 3\n";
+  expectUnchecked(read("a.ply", head(xyz() + faceElement() + edge) + points() + faces() + rows), {3}, "edge 1");
+  expectUnchecked(read("a.ply", head(xyz() + edge + faceElement()) + points() + rows + faces()), {3}, "edge 1");
+  expectRefused("a.ply", head(xyz() + faceElement() + edge) + points() + faces() + "0 1\n0 4\n2 3\n",
+                "a.ply:", "edge 1 names vertex 4 of 4");
 }
 
 TEST_F(PlyGrammar, RangeGrid) {

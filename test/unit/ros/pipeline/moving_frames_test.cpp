@@ -151,6 +151,34 @@ TEST(Map, ThatMovesAgainstTheFixedFrameIsNoClearStep) {
   EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "a map of now: " << scene.outcome.reason;
 }
 
+// The table rises through the cloth in one step and sinks through it in the next, at whose end it is back.
+TEST(Map, ThatMovesBackWithinAStepIsNoClearStep) {
+  Mapped scene;
+  const std::vector<double> heights{-0.5, -0.5, 0.2, -0.5, -0.5};
+  for (std::size_t i = 0; i < heights.size(); ++i) scene.move("odom", 0.05 * static_cast<double>(i), heights[i]);
+  scene.giveMapIn("odom", 0);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    scene.offer(0.05 * static_cast<double>(i), 0.05f);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), i == 1 || i == 4) << i << ": " << scene.outcome.reason;
+  }
+}
+
+// What moved before the first map came, in the step in which it comes.
+TEST(Map, WhoseFrameMovedBeforeItCameIsNoClearStep) {
+  for (const bool moves : {false, true}) {
+    Mapped scene;
+    for (const double at : {0.0, 0.05}) scene.move("odom", at, moves ? 0.2 : -0.5);
+    for (const double at : {0.08, 0.1, 0.15}) scene.move("odom", at, -0.5);
+    scene.offer(0, 0.05f);
+    scene.offer(0.05, 0.05f);
+    scene.giveMapIn("odom", 0.08);
+    scene.offer(0.1, 0.05f);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), !moves) << scene.outcome.reason;
+    scene.offer(0.15, 0.05f);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  }
+}
+
 TEST(Map, WhoseFrameNobodyTellsOfIsNoClearStep) {
   Mapped scene;
   scene.move("odom", 0, -0.5);

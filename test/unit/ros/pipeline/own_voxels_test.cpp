@@ -1,7 +1,10 @@
 // Own voxels through parameters, messages and map files.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
+#include <mutex>
+#include <thread>
 
 #include "dccd/assurance.h"
 #include "support/folder_test.h"
@@ -54,6 +57,66 @@ TEST_F(OwnVoxelsOfANode, AnEmptyMapHasNotSeenTheTableFree) {
   const Outcome& near = driven.feed(1.4, 0.05f);
   EXPECT_TRUE(assuranceOf(near).clear()) << describe(assuranceOf(near));
   EXPECT_EQ(driven.feed(1.5, -0.05f).touching, Touching::NEW) << "it was there before the cloth came";
+}
+
+// The second map shows what the third one does, from when the cloth was far from there.
+TEST_F(OwnVoxelsOfANode, AMapThatIsRefusedOrGivesWayLeavesInDoubtWhatTheNextOneShows) {
+  enum class Second { USED, REFUSED, WITHOUT_PLACE };
+  for (const Second second : {Second::USED, Second::REFUSED, Second::WITHOUT_PLACE}) {
+    Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));
+    driven.feed(1, 0.8f);
+    driven.giveMap(tableAnd(false), 1);
+    ASSERT_TRUE(assuranceOf(driven.feed(1.1, 0.8f)).clear());
+    LoadedMap map = decodeMapMessage(mapOf(tableAnd(true), 1.1), driven.config);
+    if (second == Second::WITHOUT_PLACE) map.frame_id = "nowhere";
+    if (second == Second::REFUSED) map.surface = nullptr, map.problem = "a test";
+    driven.pipeline.setMap(std::move(map), 0);
+    for (const auto& [stamp_s, z] : {std::pair(1.2, 0.8f), {1.3, 0.45f}}) {
+      driven.take(0, cloud(stamp_s, z));
+      EXPECT_TRUE(driven.pipeline.nextOutcome(1000000000, driven.outcome));  // no transform comes
+    }
+    driven.giveMap(tableAnd(true), 1.3);
+    const Outcome& reached = driven.feed(1.4, 0.35f);
+    EXPECT_FALSE(assuranceOf(reached).clear()) << static_cast<int>(second);
+    EXPECT_EQ(reached.step->map.own.doubted, second == Second::USED ? 0u : 4u) << static_cast<int>(second);
+  }
+}
+
+// While a map is decoded, or the worker is in a step, more of them come.
+TEST_F(OwnVoxelsOfANode, TheLoaderKeepsFinishedMapsAndSaysWhichCameAfterOthers) {
+  for (const bool owns : {true, false}) {
+    Driven driven(scene(std::string("octomap_topic: /map") + (owns ? ", own_voxels_m: auto" : "")));
+    std::mutex decoding;
+    std::unique_lock<std::mutex> hold(decoding);
+    std::atomic<int> count{0};
+    MapLoader loader(driven.config, driven.feed_tf, [&] {
+      ++count;
+      const std::lock_guard<std::mutex> wait(decoding);
+    });
+    const auto submit = [&](int stamp_s) { loader.submit(map(stamp_s), 0, stamp_s); };
+    const auto finished = [&](int maps) {
+      while (count < maps) std::this_thread::yield();
+    };
+    submit(1);
+    finished(1);
+    submit(2);  // gives way to the third
+    submit(3);
+    hold.unlock();
+    finished(2);
+    for (int i = 4; i <= 7; ++i) {
+      submit(i);
+      finished(i - 1);
+    }
+    std::vector<std::pair<StampNs, bool>> taken;
+    for (LoadedMap one; loader.take(one);) taken.emplace_back(one.stamp_ns / 1000000000, one.after_missed);
+    if (owns) {
+      const std::vector<std::pair<StampNs, bool>> first_and_last{{1, false}, {3, true}, {4, false}, {7, true}};
+      EXPECT_EQ(taken, first_and_last);
+    } else {
+      ASSERT_EQ(taken.size(), 1u);
+      EXPECT_EQ(taken[0].first, 7);
+    }
+  }
 }
 
 TEST_F(OwnVoxelsOfANode, MapsOfACellWithoutTheBodyCountAlsoBeforeItsFirstFrame) {
