@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -236,12 +237,15 @@ class MonitorPipeline {
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
   void placeMap(std::int64_t now_ns);
-  /// Poses that were seen, of a body by its number, or of the map.
-  using SeenPoses = std::vector<std::pair<std::size_t, std::vector<SeenPose>>>;
-  /// Where the frames were of what is held, the map and static bodies, since the clock body's last frame, up to the
+  /// Poses that were seen, of static bodies by number, and of maps by their frames.
+  struct SeenPoses {
+    std::map<std::size_t, std::vector<SeenPose>> bodies;
+    std::map<std::string, std::vector<SeenPose>> maps;
+  };
+  /// Where the frames were of what is held, maps and static bodies, since the clock body's last frame, up to the
   /// stamp of the one that waits. False: it is not known of all.
   bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
-  void lookBack(std::size_t body, const std::string& target, const std::string& source);
+  std::vector<SeenPose> lookBack(const std::string& target, const std::string& source) const;
   std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                      StampNs to_ns) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.

@@ -127,7 +127,7 @@ class World {
       if (slides) finger_ = level();
       if (shifts) odom_ = odom_ < 0 ? -1.5 : -1;
       transformTo("finger", t, dips ? level() : finger_);
-      transformTo("odom", t, t < now && chance(150) ? 0.5 : odom_);
+      transformTo("odom", t, chance(150) ? 0.5 : odom_);
     }
     if (chance(8)) {  // the stamps go back, and where it is now nobody saw it go
       other_ = level();

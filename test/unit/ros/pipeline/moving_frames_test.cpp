@@ -151,6 +151,36 @@ TEST(Map, ThatMovesAgainstTheFixedFrameIsNoClearStep) {
   EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "a map of now: " << scene.outcome.reason;
 }
 
+// It is up in the cloth at the very stamp of a frame: both steps that have this frame are of that time.
+TEST(Map, ThatIsElsewhereWhereOneStepEndsAndTheNextBeginsIsInNeitherClear) {
+  Mapped scene;
+  for (int i = 0; i <= 4; ++i) scene.move("odom", 0.05 * i, i == 2 ? 0.2 : -0.5);
+  scene.giveMapIn("odom", 0);
+  for (int i = 0; i <= 4; ++i) {
+    scene.offer(0.05 * i, 0.05f);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), i == 1 || i == 4) << i << ": " << scene.outcome.reason;
+  }
+}
+
+// A map of another frame comes while a step waits that is before its stamp.
+TEST(Map, ThatMovesIsSeenAlsoWhereTheNextMapHasAnotherFrame) {
+  Mapped scene(
+      test::scene("own_voxels_m: auto, clock_body: cloth, bodies: {cloth: {topic: cloth}, other: {topic: other}}"));
+  for (const double at : {0.0, 0.05, 0.1, 0.15}) scene.move("odom", at, -0.5);
+  scene.move("odom", 0.07, 0.2);
+  scene.giveMapIn("odom", 0);
+  for (const double at : {0.0, 0.05}) {
+    scene.take(1, cloudAt(after(at), 1));
+    scene.offer(at, 0.05f);
+  }
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  EXPECT_FALSE(scene.offer(0.1, 0.05f)) << "the other one's frame is to come";
+  scene.giveMapIn("world", 0.12);
+  scene.take(1, cloudAt(after(0.1), 1));
+  EXPECT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved) << "through the cloth and back";
+}
+
 TEST(Map, WhoseFrameNobodyTellsOfIsNoClearStep) {
   Mapped scene;
   scene.move("odom", 0, -0.5);
