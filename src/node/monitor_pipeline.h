@@ -177,7 +177,8 @@ class MonitorPipeline {
   bool trusted_placed_ = false;
   std::int64_t unplaced_since_ns_ = 0, settled_map_ns_ = 0;
   std::string map_note_;
-  StampNs clock_ns_ = 0;  // of the clock body's last frame that was placed; 0: none
+  StampNs clock_ns_ = 0;               // of the clock body's last frame that was placed; 0: none
+  std::uint64_t times_forgotten_ = 0;  // by tf, when that one was placed
   std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;

@@ -157,6 +157,7 @@ void MonitorPipeline::widen(std::size_t body, MeshFrame& frame) {
 
 bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
+  const std::uint64_t times_forgotten = transforms_.timesForgotten();
   const bool overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   StepStatus problem = StepStatus::NO_TRANSFORM;
@@ -198,6 +199,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   transform(fixed_from_mesh, done.mesh.positions);
   if (is_clock) {
     clock_ns_ = done.mesh.stamp_ns;
+    times_forgotten_ = times_forgotten;
     for (const auto& [number, poses] : held.bodies) monitor_->seen(number, poses);
     for (const auto& [frame, poses] : held.maps) monitor_->mapSeen(frame, poses);
   }
@@ -315,6 +317,8 @@ std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, c
                                                     StampNs from_ns, StampNs to_ns) const {
   std::vector<SeenPose> seen;
   if (from_ns == 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s + 1e-6) return seen;
+  // What tf saw before that, nobody knows any more.
+  if (transforms_.timesForgotten() != times_forgotten_) return {unknownAt(to_ns - 1)};
   const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from_ns, to_ns);
   if (stamps.size() > tolerance::MOST_POSES_A_STEP) return {unknownAt(stamps.back())};
   std::string unused;

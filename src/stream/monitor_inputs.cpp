@@ -66,8 +66,8 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
 std::string unknown(const std::string& name, StampNs at_ns) {
   std::ostringstream text;
   text << "where " << name << " was is not known for all of this step (no transform of its frame at "
-       << at_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << at_ns % 1'000'000'000
-       << " s, or more than " << tolerance::MOST_POSES_A_STEP << ")";
+       << at_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << at_ns % 1'000'000'000 << " s, more than "
+       << tolerance::MOST_POSES_A_STEP << " of them, or stamps of tf that went back)";
   return text.str();
 }
 

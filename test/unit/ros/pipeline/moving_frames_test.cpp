@@ -108,6 +108,28 @@ TEST(RigidBodies, AFloodOfTransformsWithinAStepIsNotLookedAtAndProvesNothing) {
   EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
 }
 
+// Another frame's stamps go back, and tf begins anew, within the step in which the tip dips through the cloth.
+TEST(RigidBodies, WhatTfForgotWithinAStepIsNotTakenForRest) {
+  for (const double dip : {0.5, -0.5}) {
+    Moving scene(clothAndTip());
+    scene.move("tip", 0, 0.5);
+    scene.move("tip", 0.05, 0.5);
+    scene.move("far", 0.05, 0);
+    scene.offer(0, 0);
+    scene.offer(0.05, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    scene.move("tip", 0.07, dip);
+    scene.move("far", -2, 0);
+    scene.move("tip", 0.1, 0.5);
+    scene.offer(0.1, 0);
+    EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL) << dip;
+    EXPECT_NE(scene.outcome.reason.find("or stamps of tf that went back"), std::string::npos) << scene.outcome.reason;
+    scene.move("tip", 0.15, 0.5);
+    scene.offer(0.15, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  }
+}
+
 struct Mapped : Moving {
   explicit Mapped(const XmlRpcValue& tree = scene()) : Moving(tree) {}
   void giveMapIn(const std::string& frame, double after_s, std::int64_t now_ns = 0) {
