@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -107,10 +108,13 @@ class DCCD_EXPORT Monitor {
   void setMapBeside(ObstacleMap map);
   const ObstacleMap& map() const;       ///< as it was given last
   const ObstacleMap& mapInUse() const;  ///< of the last step, and of the next one where none waits
+  /// Frames of the maps that steps to come may have: of the one in use, and of those that wait.
+  std::set<std::string> mapFrames() const;
   /// Where the frame of what holds at all times was, up to the stamps of the steps to come: of a static body
-  /// (fixed_from_frame, as MeshFrame::pose) or of the map (body OBSTACLE_BODY, map_from_fixed). A step in which it is
-  /// not where push() or setMap() had it is PARTIAL.
+  /// (fixed_from_frame, as MeshFrame::pose) or of maps (map_from_fixed). A step in which it is not where push() or
+  /// setMap() had it is PARTIAL.
   void seen(std::size_t body, const std::vector<SeenPose>& poses);
+  void mapSeen(const std::string& frame, const std::vector<SeenPose>& poses);
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
   bool next(std::int64_t now_ns, Outcome& outcome);

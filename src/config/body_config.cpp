@@ -75,7 +75,7 @@ void readTopology(ParameterReader section, BodyConfig& body) {
 
 void readRigid(ParameterReader section, BodyConfig& body) {
   body.mesh_file = section.get("mesh", std::string());
-  body.tf_frame = section.get("frame", std::string());
+  body.tf_frame = section.frame("frame");
   body.mesh_scale = section.number("scale", 1.0, 1e-6, 1e6);
   section.finish();
   if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY, DAE) or a package:// path");
@@ -103,7 +103,7 @@ void readSource(ParameterReader& reader, const std::string& default_topic, BodyC
   std::vector<std::string> types{"auto"};
   for (const MeshType& type : meshTypes()) types.push_back(type.name);
   body.input.type = reader.choice("type", "auto", types);
-  body.input.frame_id = reader.get("frame_id", std::string());
+  body.input.frame_id = reader.frame("frame_id");
   body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
   body.input.max_vertices = reader.integer("max_vertices", body.input.max_vertices, 1, MANY);
   readTopology(reader.section("topology"), body);

@@ -43,7 +43,7 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
     reader.fail("octomap_topic", "is empty; remove it, or write effects/octomap: off where there is no map");
   }
   config.octomap_file = reader.get("octomap_file", std::string());
-  config.octomap_frame = reader.get("octomap_frame", std::string());
+  config.octomap_frame = reader.frame("octomap_frame");
   config.max_map_bytes = reader.integer("max_map_mb", config.max_map_bytes >> 20, 1, 1 << 20) << 20;
   if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
   readClouds(reader, config);

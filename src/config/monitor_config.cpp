@@ -284,7 +284,7 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path, const
 MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, const RobotLoader& load) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
-  config.fixed_frame = reader.get("fixed_frame", std::string());
+  config.fixed_frame = reader.frame("fixed_frame");
   readAccuracy(reader, config);
   readThresholds(reader, config);
   readMap(reader, config);

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <utility>
 
+#include "input/short_text.h"
+
 namespace dccd {
 
 using Kind = ParameterTree::Kind;
@@ -133,6 +135,15 @@ std::string ParameterReader::text(const std::string& name) {
 
 std::string ParameterReader::text(const std::string& name, const std::string& fallback) {
   return has(name) ? text(name) : fallback;
+}
+
+std::string ParameterReader::frame(const std::string& name) {
+  const std::string given = get(name, std::string());
+  if (given.empty()) return given;
+  const std::string frame = given.substr(given[0] == '/' ? 1 : 0);
+  const std::string problem = frameNameProblem(frame);
+  if (!problem.empty()) fail(name, "is '" + shortText(given, MAX_NAME) + "', which is no frame's name: " + problem);
+  return frame;
 }
 
 std::string ParameterReader::choice(const std::string& name, const std::string& fallback,

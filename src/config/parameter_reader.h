@@ -33,6 +33,8 @@ class ParameterReader {
   /// A text that is not empty.
   std::string text(const std::string& name);
   std::string text(const std::string& name, const std::string& fallback);
+  /// A tf frame; empty where it is not set. One slash in front of it is left out, as of messages.
+  std::string frame(const std::string& name);
   /// One of the choices. YAML's on and off are booleans, so those are taken for the words where these are choices.
   std::string choice(const std::string& name, const std::string& fallback, const std::vector<std::string>& choices);
 

@@ -96,6 +96,7 @@ void TransformFeed::clear() {
   buffer_.clear();
   for (auto& named : frames_) named.second.sent.clear();
   kept_count_ = 0;
+  ++times_forgotten_;
 }
 
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {

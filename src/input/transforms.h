@@ -57,6 +57,8 @@ class TransformFeed {
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
   std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
 
+  /// How often what was sent before was forgotten.
+  std::uint64_t timesForgotten() const { return times_forgotten_; }
   /// How many transforms could not be used.
   std::uint64_t unusable() const { return unusable_; }
   /// After a lookup() that failed: "no transform from 'a' to …: why", and which frames have had but unusable ones.
@@ -100,7 +102,7 @@ class TransformFeed {
   mutable Chain from_target_, from_source_;        // buffers of a question
   std::size_t kept_count_ = 0;
   bool has_disputed_ = false;
-  std::atomic<std::uint64_t> unusable_{0};
+  std::atomic<std::uint64_t> unusable_{0}, times_forgotten_{0};
   std::map<std::string, std::string> only_unusable_;  // per child frame that has had no usable one: what was wrong
   std::set<std::string> told_;
   std::vector<std::string> complaints_;

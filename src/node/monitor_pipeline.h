@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -177,7 +178,8 @@ class MonitorPipeline {
   bool trusted_placed_ = false;
   std::int64_t unplaced_since_ns_ = 0, settled_map_ns_ = 0;
   std::string map_note_;
-  StampNs clock_ns_ = 0;  // of the clock body's last frame that was placed; 0: none
+  StampNs clock_ns_ = 0;               // of the clock body's last frame that was placed; 0: none
+  std::uint64_t times_forgotten_ = 0;  // by tf, when that one was placed
   std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;
@@ -237,12 +239,15 @@ class MonitorPipeline {
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
   void placeMap(std::int64_t now_ns);
-  /// Poses that were seen, of a body by its number, or of the map.
-  using SeenPoses = std::vector<std::pair<std::size_t, std::vector<SeenPose>>>;
-  /// Where the frames were of what is held, the map and static bodies, since the clock body's last frame, up to the
+  /// Poses that were seen, of static bodies by number, and of maps by their frames.
+  struct SeenPoses {
+    std::map<std::size_t, std::vector<SeenPose>> bodies;
+    std::map<std::string, std::vector<SeenPose>> maps;
+  };
+  /// Where the frames were of what is held, maps and static bodies, since the clock body's last frame, up to the
   /// stamp of the one that waits. False: it is not known of all.
   bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
-  void lookBack(std::size_t body, const std::string& target, const std::string& source);
+  std::vector<SeenPose> lookBack(const std::string& target, const std::string& source) const;
   std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                      StampNs to_ns) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.

@@ -157,6 +157,7 @@ void MonitorPipeline::widen(std::size_t body, MeshFrame& frame) {
 
 bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
+  const std::uint64_t times_forgotten = transforms_.timesForgotten();
   const bool overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   StepStatus problem = StepStatus::NO_TRANSFORM;
@@ -193,12 +194,14 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   if (isStatic(body)) done.mesh.pose = fixed_from_mesh;
   if (isStatic(body) && config_.fixed_frame.empty()) {
     static_meshes_[body] = done.mesh;
-    lookBack(body, fixed_frame_, done.mesh.frame_id);
+    monitor_->seen(body, lookBack(fixed_frame_, done.mesh.frame_id));
   }
   transform(fixed_from_mesh, done.mesh.positions);
   if (is_clock) {
     clock_ns_ = done.mesh.stamp_ns;
-    for (const auto& one : held) monitor_->seen(one.first, one.second);
+    times_forgotten_ = times_forgotten;
+    for (const auto& [number, poses] : held.bodies) monitor_->seen(number, poses);
+    for (const auto& [frame, poses] : held.maps) monitor_->mapSeen(frame, poses);
   }
   widen(body, done.mesh);
   monitor_->push(body, std::move(done.mesh), now_ns);
@@ -266,7 +269,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   if (placed) {
     if (std::exchange(unplaced_map_->after_missed, false)) monitor_->missMap();
     monitor_->setMap(std::move(map));
-    lookBack(OBSTACLE_BODY, frame, fixed_frame_);
+    monitor_->mapSeen(frame, lookBack(frame, fixed_frame_));
     settled_map_ns_ = unplaced_map_->arrival_ns;
     if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
     unplaced_map_.reset();
@@ -284,29 +287,30 @@ bool MonitorPipeline::mapMayCome(std::int64_t now_ns) const {
 
 bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   bool all_known = true;
-  const auto find = [&](std::size_t body, const std::string& target, const std::string& source) {
-    if (target == source) return;
-    std::vector<SeenPose> seen = posesBetween(target, source, clock_ns_, stamp_ns);
+  const auto find = [&](const std::string& target, const std::string& source) {
+    std::vector<SeenPose> seen = posesBetween(target, source, clock_ns_ - 1, stamp_ns);  // the last frame's stamp, too
     std::string unused;
     SeenPose last{stamp_ns, {}};
     const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
     seen.push_back(known ? last : unknownAt(stamp_ns));
-    held.emplace_back(body, std::move(seen));
     all_known = all_known && known;
+    return seen;
   };
-  const ObstacleMap& map = monitor_->map();
-  if (map.surface) find(OBSTACLE_BODY, map.frame_id, fixed_frame_);
+  for (const std::string& frame : monitor_->mapFrames()) {
+    if (frame != fixed_frame_) held.maps[frame] = find(frame, fixed_frame_);
+  }
   // A fixed frame that was named is at rest: somebody says so. One that was learnt may be a camera's that moves.
   for (std::size_t b = 0; b < static_meshes_.size(); ++b) {
-    if (static_meshes_[b]) find(b, fixed_frame_, static_meshes_[b]->frame_id);
+    const std::optional<DecodedMesh>& mesh = static_meshes_[b];
+    if (mesh && mesh->frame_id != fixed_frame_) held.bodies[b] = find(fixed_frame_, mesh->frame_id);
   }
   return all_known;
 }
 
 /// Steps that wait for other bodies will be answered with what is held only now, and the next one begins where the
 /// clock body's last frame was.
-void MonitorPipeline::lookBack(std::size_t body, const std::string& target, const std::string& source) {
-  if (target == source || clock_ns_ == 0) return;
+std::vector<SeenPose> MonitorPipeline::lookBack(const std::string& target, const std::string& source) const {
+  if (target == source || clock_ns_ == 0) return {};
   std::vector<SeenPose> seen;
   if (monitor_->waiting()) {
     const auto longest_ns = static_cast<StampNs>(config_.monitor.store.max_step_s * 1e9);
@@ -315,7 +319,7 @@ void MonitorPipeline::lookBack(std::size_t body, const std::string& target, cons
   SeenPose last{clock_ns_, {}};
   std::string unused;
   if (transforms_.lookup(target, source, clock_ns_, last.pose, unused)) seen.push_back(last);
-  monitor_->seen(body, seen);
+  return seen;
 }
 
 /// Target_from_source at each stamp of tf between the two, as far back as a step may reach (from 0: not at all).
@@ -323,6 +327,8 @@ std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, c
                                                     StampNs from_ns, StampNs to_ns) const {
   std::vector<SeenPose> seen;
   if (from_ns == 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s + 1e-6) return seen;
+  // What tf saw before that, nobody knows any more.
+  if (transforms_.timesForgotten() != times_forgotten_) return {unknownAt(to_ns - 1)};
   const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from_ns, to_ns);
   if (stamps.size() > tolerance::MOST_POSES_A_STEP) return {unknownAt(stamps.back())};
   std::string unused;

@@ -210,7 +210,7 @@ void Monitor::setBody(std::size_t body, Body what) {
     m.told_runs.push_back(0);
     m.references.frames.emplace_back();
     m.references.topologies.emplace_back();
-    m.held_seen.emplace(m.held_seen.end() - 1);  // the map's stays the last
+    m.held_seen.emplace_back();
   }
   m.bodies = std::move(bodies);
   m.stores[body].clear();

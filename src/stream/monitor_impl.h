@@ -53,9 +53,10 @@ struct Monitor::Impl {
   bool missed_map = false;  // since the last one that was given
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;  // of the step that is made
-  std::string map_frame;     // of the last map that there was
-  /// Per body, and last of the map: for the steps to come, by stamp.
-  std::vector<std::map<StampNs, Eigen::Isometry3d>> held_seen;
+  /// For the steps to come: per body, and by the frames of maps.
+  using PosesByStamp = std::map<StampNs, Eigen::Isometry3d>;
+  std::vector<PosesByStamp> held_seen;
+  std::map<std::string, PosesByStamp> map_seen;
   History history, side_history, doubt_history;  // of steps; of predictions and checks; of voxels in doubt
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
@@ -104,7 +105,11 @@ struct Monitor::Impl {
   void lookAtHeld(Step& step) const;
   /// The earliest stamp at which a step to come may begin; where none is known of, the given one.
   StampNs oldestStart(StampNs otherwise) const;
-  void forgetHeldSeen() { held_seen.assign(bodies.size() + 1, {}); }
+  void keepSeen(const std::vector<SeenPose>& poses, PosesByStamp& all) const;
+  void forgetHeldSeen() {
+    held_seen.assign(bodies.size(), {});
+    map_seen.clear();
+  }
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();
   /// Nothing is carried over a seam.

@@ -66,8 +66,8 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
 std::string unknown(const std::string& name, StampNs at_ns) {
   std::ostringstream text;
   text << "where " << name << " was is not known for all of this step (no transform of its frame at "
-       << at_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << at_ns % 1'000'000'000
-       << " s, or more than " << tolerance::MOST_POSES_A_STEP << ")";
+       << at_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << at_ns % 1'000'000'000 << " s, more than "
+       << tolerance::MOST_POSES_A_STEP << " of them, or stamps of tf that went back)";
   return text.str();
 }
 
@@ -169,16 +169,18 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
 
 /// A static body and the map are held where they were. What tf said since must not be contradicted in silence.
 void Monitor::Impl::lookAtHeld(Step& step) const {
-  for (std::size_t b = 0; b < held_seen.size(); ++b) {
+  const auto of_map = map_seen.find(step.map.frame_id);
+  for (std::size_t b = 0; b <= bodies.size(); ++b) {
     const bool is_map = b == bodies.size();
-    if (held_seen[b].empty() || (is_map ? !step.map.surface : stores[b].empty())) continue;
+    if (is_map ? !step.map.surface || of_map == map_seen.end() : stores[b].empty()) continue;
+    const PosesByStamp& seen = is_map ? of_map->second : held_seen[b];
     const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
     double off_m = 0;
     std::optional<StampNs> unknown_at;
     Eigen::AlignedBox3d bounds;
     // From its start on: what is elsewhere there moves back within the step.
-    const auto end = held_seen[b].upper_bound(step.stamp_ns);
-    for (auto one = held_seen[b].lower_bound(step.start_ns); one != end; ++one) {
+    const auto end = seen.upper_bound(step.stamp_ns);
+    for (auto one = seen.lower_bound(step.start_ns); one != end; ++one) {
       if (!unknown_at && !one->second.matrix().allFinite()) unknown_at = one->first;
       if (unknown_at || one->second.matrix() == held.matrix()) continue;
       if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
@@ -259,10 +261,17 @@ bool Monitor::Impl::separates(const Body& body) const {
 }
 
 void Monitor::seen(std::size_t body, const std::vector<SeenPose>& poses) {
-  auto& all = impl_->held_seen.at(body == OBSTACLE_BODY ? impl_->bodies.size() : body);
+  impl_->keepSeen(poses, impl_->held_seen.at(body));
+}
+
+void Monitor::mapSeen(const std::string& frame, const std::vector<SeenPose>& poses) {
+  impl_->keepSeen(poses, impl_->map_seen[frame]);
+}
+
+void Monitor::Impl::keepSeen(const std::vector<SeenPose>& poses, PosesByStamp& all) const {
   for (const SeenPose& one : poses) all.insert_or_assign(one.stamp_ns, one.pose);
   // Also where no step is ever made.
-  if (!all.empty()) all.erase(all.begin(), all.lower_bound(impl_->oldestStart(all.rbegin()->first)));
+  if (!all.empty()) all.erase(all.begin(), all.lower_bound(oldestStart(all.rbegin()->first)));
 }
 
 StampNs Monitor::Impl::oldestStart(StampNs otherwise) const {

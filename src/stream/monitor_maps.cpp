@@ -23,10 +23,22 @@ const ObstacleMap& Monitor::map() const {
 
 const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
 
+std::set<std::string> Monitor::mapFrames() const {
+  std::set<std::string> frames;
+  if (impl_->map.surface) frames.insert(impl_->map.frame_id);
+  for (const Impl::MapToCome& one : impl_->maps_to_come) frames.insert(one.map.frame_id);
+  return frames;
+}
+
 void Monitor::setMap(ObstacleMap map) {
   Impl& m = *impl_;
-  // Steps that wait may have another map, of the same frame, after none.
-  if (!map.frame_id.empty() && map.frame_id != std::exchange(m.map_frame, map.frame_id)) m.held_seen.back().clear();
+  if (!map.frame_id.empty()) {  // steps that wait may have another map, of the same frame, after none
+    std::set<std::string> frames = mapFrames();
+    frames.insert(map.frame_id);
+    for (auto one = m.map_seen.begin(); one != m.map_seen.end();) {
+      one = frames.count(one->first) ? std::next(one) : m.map_seen.erase(one);
+    }
+  }
   const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
     if (!m.maps_to_come.empty()) m.missed_map = true;

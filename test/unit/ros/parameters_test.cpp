@@ -37,6 +37,19 @@ TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
   expectMistakes({{"octomap_topic: \"\"", "octomap_topic is empty; remove it"}});
 }
 
+// A frame of tf2 has none, so that nothing ever had a place.
+TEST(Parameters, OneSlashInFrontOfAFrameIsLeftOutAsInMessages) {
+  const MonitorConfig config =
+      readConfig(parameters("fixed_frame: /world, octomap_frame: /map, bodies: {cloth: {frame_id: /camera}, "
+                            "finger: {rigid: {mesh: no_such_file.stl, frame: /tip}}}, effects: {rigid_bodies: auto}"));
+  EXPECT_EQ(config.fixed_frame, "world");
+  EXPECT_EQ(config.octomap_frame, "map");
+  EXPECT_EQ(config.bodies.at(0).input.frame_id, "camera");
+  EXPECT_EQ(config.bodies.at(1).tf_frame, "tip");
+  expectMistakes({{"fixed_frame: /", "~fixed_frame is '/', which is no frame's name: it is empty"},
+                  {"octomap_frame: //map", "which is no frame's name: it begins with a slash"}});
+}
+
 TEST(Parameters, ADefaultTopicIsThatOfASingleBodyWithoutOne) {
   const auto topic = [](const char* yaml) { return readConfig(parameters(yaml)).bodies[0].topic; };
   EXPECT_EQ(topic("default_topic: /cloth"), "/cloth");

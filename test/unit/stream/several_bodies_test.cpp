@@ -90,11 +90,11 @@ TEST_F(TwoBodies, PosesOfWhatIsHeldAreNotKeptForStepsThatNeverCome) {
     for (int k = 0; k < 3000; ++k) {
       std::vector<SeenPose> seen;
       for (int i = 1; i <= 10; ++i) seen.push_back({(100 * k + 10 * i) * MS, Eigen::Isometry3d::Identity()});
-      two.seen(OBSTACLE_BODY, seen);
+      two.mapSeen("odom", seen);
       two.push(0, floor((100 * k + 100) * MS, k % 2), NOW);
       Outcome outcome;
       while (two.next(LATER, outcome)) EXPECT_FALSE(outcome.answered);
-      ASSERT_LT(two.impl().held_seen.back().size(), 100u) << "after " << k << " frames";
+      ASSERT_LT(two.impl().map_seen.at("odom").size(), 100u) << "after " << k << " frames";
     }
   }
 }

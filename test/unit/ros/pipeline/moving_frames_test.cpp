@@ -108,6 +108,28 @@ TEST(RigidBodies, AFloodOfTransformsWithinAStepIsNotLookedAtAndProvesNothing) {
   EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
 }
 
+// Another frame's stamps go back, and tf begins anew, within the step in which the tip dips through the cloth.
+TEST(RigidBodies, WhatTfForgotWithinAStepIsNotTakenForRest) {
+  for (const double dip : {0.5, -0.5}) {
+    Moving scene(clothAndTip());
+    scene.move("tip", 0, 0.5);
+    scene.move("tip", 0.05, 0.5);
+    scene.move("far", 0.05, 0);
+    scene.offer(0, 0);
+    scene.offer(0.05, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    scene.move("tip", 0.07, dip);
+    scene.move("far", -2, 0);
+    scene.move("tip", 0.1, 0.5);
+    scene.offer(0.1, 0);
+    EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL) << dip;
+    EXPECT_NE(scene.outcome.reason.find("or stamps of tf that went back"), std::string::npos) << scene.outcome.reason;
+    scene.move("tip", 0.15, 0.5);
+    scene.offer(0.15, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  }
+}
+
 struct Mapped : Moving {
   explicit Mapped(const XmlRpcValue& tree = scene()) : Moving(tree) {}
   void giveMapIn(const std::string& frame, double after_s, std::int64_t now_ns = 0) {
@@ -151,14 +173,13 @@ TEST(Map, ThatMovesAgainstTheFixedFrameIsNoClearStep) {
   EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "a map of now: " << scene.outcome.reason;
 }
 
-// The table rises through the cloth in one step and sinks through it in the next, at whose end it is back.
-TEST(Map, ThatMovesBackWithinAStepIsNoClearStep) {
+// It is up in the cloth at the very stamp of a frame: both steps that have this frame are of that time.
+TEST(Map, ThatIsElsewhereWhereOneStepEndsAndTheNextBeginsIsInNeitherClear) {
   Mapped scene;
-  const std::vector<double> heights{-0.5, -0.5, 0.2, -0.5, -0.5};
-  for (std::size_t i = 0; i < heights.size(); ++i) scene.move("odom", 0.05 * static_cast<double>(i), heights[i]);
+  for (int i = 0; i <= 4; ++i) scene.move("odom", 0.05 * i, i == 2 ? 0.2 : -0.5);
   scene.giveMapIn("odom", 0);
-  for (std::size_t i = 0; i < heights.size(); ++i) {
-    scene.offer(0.05 * static_cast<double>(i), 0.05f);
+  for (int i = 0; i <= 4; ++i) {
+    scene.offer(0.05 * i, 0.05f);
     EXPECT_EQ(assuranceOf(scene.outcome).clear(), i == 1 || i == 4) << i << ": " << scene.outcome.reason;
   }
 }
@@ -177,6 +198,25 @@ TEST(Map, WhoseFrameMovedBeforeItCameIsNoClearStep) {
     scene.offer(0.15, 0.05f);
     EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
   }
+}
+
+// A map of another frame comes while a step waits that is before its stamp.
+TEST(Map, ThatMovesIsSeenAlsoWhereTheNextMapHasAnotherFrame) {
+  Mapped scene(
+      test::scene("own_voxels_m: auto, clock_body: cloth, bodies: {cloth: {topic: cloth}, other: {topic: other}}"));
+  for (const double at : {0.0, 0.05, 0.1, 0.15}) scene.move("odom", at, -0.5);
+  scene.move("odom", 0.07, 0.2);
+  scene.giveMapIn("odom", 0);
+  for (const double at : {0.0, 0.05}) {
+    scene.take(1, cloudAt(after(at), 1));
+    scene.offer(at, 0.05f);
+  }
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  EXPECT_FALSE(scene.offer(0.1, 0.05f)) << "the other one's frame is to come";
+  scene.giveMapIn("world", 0.12);
+  scene.take(1, cloudAt(after(0.1), 1));
+  EXPECT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved) << "through the cloth and back";
 }
 
 TEST(Map, WhoseFrameNobodyTellsOfIsNoClearStep) {
