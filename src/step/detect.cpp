@@ -222,10 +222,7 @@ bool History::Impl::fill(const Part& part, StepStats& stats) {
   };
   bounded_ = self_tests.tested();
   if (searchesStart(part, carried)) {
-    for (std::size_t b = 0; b < bounded_.size(); ++b) {
-      const bool is_searched = meetsItself(scene.bodies()[b].setup) && !self_tests.unfolded()[b].isWhole();
-      bounded_[b] = bounded_[b] || is_searched;
-    }
+    for (std::size_t b = 0; b < bounded_.size(); ++b) bounded_[b] = bounded_[b] || meetsItself(scene.bodies()[b].setup);
   }
   // A single body that does not meet itself is tested against the map alone, which has bounds of its own.
   const bool any = std::find(bounded_.begin(), bounded_.end(), 1) != bounded_.end();
