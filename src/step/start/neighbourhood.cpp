@@ -126,6 +126,14 @@ void Neighbourhood::learn(const SceneArrays& scene, std::size_t body_index) {
   }
   edges.build(body, FeatureKind::EDGE);
   faces.build(body, FeatureKind::FACE);
+  listed.resize(body.rank(FeatureKind::FACE).size());
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    scene.featureVertices(FeatureKind::FACE, body_index, body.face_begin + static_cast<Index>(i), listed[i].data());
+  }
+}
+
+void Neighbourhood::learnFaces(const SceneBody& body) {
+  if (searched) return;
   const ClusterTree &edge_tree = body.tree(FeatureKind::EDGE), &face_tree = body.tree(FeatureKind::FACE);
   corner.resize(faces.slots.size());
   for (std::size_t v = 0; v < body.usedCount(); ++v) {
@@ -168,10 +176,7 @@ void Neighbourhood::learn(const SceneArrays& scene, std::size_t body_index) {
     sharing.leaveOut(owns);
     fans.build(faces, corner, closed, face_tree.level(0).groups * simd::GROUP);
   }
-  listed.resize(body.rank(FeatureKind::FACE).size());
-  for (std::size_t i = 0; i < listed.size(); ++i) {
-    scene.featureVertices(FeatureKind::FACE, body_index, body.face_begin + static_cast<Index>(i), listed[i].data());
-  }
+  searched = true;
 }
 
 }  // namespace dccd

@@ -38,18 +38,22 @@ struct Fans {
 struct Neighbourhood {
   std::vector<Index> internal_of_local;
   SlotsAtVertex edges, faces;
+  std::vector<Face> listed;  ///< by ranks from the body's first face's on: SceneArrays::featureVertices()
+
+  // Of a body whose faces are searched.
+  bool searched = false;  ///< it is known
   /// By slots of faces: the slot of the edge from each corner to the next, if this face stands for that edge, else
   /// NO_INDEX. Of an edge's faces one that is not spared stands for it, of these that of the lowest rank.
   std::vector<std::array<std::uint32_t, 3>> own_edges;
   std::vector<std::uint8_t> owns;  ///< by slots of faces: bit k where the k-th of these is one
   /// Of each of faces.slots, which of the face's corners the vertex is.
   std::vector<std::uint8_t> corner;
-  std::vector<Face> listed;  ///< by ranks from the body's first face's on: SceneArrays::featureVertices()
-
   FacesSharing sharing;  ///< of a body that meets itself,
   Fans fans;             ///< whose slots are those of all groups of faces, and two more: of the views TURNS and 0
 
   void learn(const SceneArrays& scene, std::size_t body_index);
+  /// Once, what a search by faces needs besides.
+  void learnFaces(const SceneBody& body);
 
  private:
   std::vector<std::uint8_t> spareFaces(const SceneBody& body) const;

@@ -48,6 +48,23 @@ struct FeaturesOfBody {
   }
 };
 
+/// Of faces, or of the edges of a and the faces of b.
+TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, bool by_faces,
+                 const std::vector<Unfolded>* unfolded) {
+  const FeatureKind first = by_faces ? FeatureKind::FACE : FeatureKind::EDGE;
+  TreePair trees;
+  trees.a = &scene.bodies()[a].tree(first);
+  trees.b = &scene.bodies()[b].tree(FeatureKind::FACE);
+  trees.span.times = Times::T0;
+  trees.adjacent = a == b;
+  trees.self = by_faces && a == b;
+  if (a == b && unfolded) {  // what does not meet during the step does not at t=0
+    trees.parts_a = (*unfolded)[a].parts(first);
+    trees.parts_b = (*unfolded)[a].parts(FeatureKind::FACE);
+  }
+  return trees;
+}
+
 /// List i goes to place[i] and on, up to place[i + 1].
 void join(const std::vector<std::vector<EdgeFace>>& lists, const std::vector<std::size_t>& place,
           std::vector<EdgeFace>& out, const StartStateSearch::Parallel& parallel) {
@@ -314,19 +331,14 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
                                     const Parallel& parallel) {
   const std::uint32_t a = next_bodies_[0], b = next_bodies_[1];
   const bool by_faces = by_faces_[a] && by_faces_[b];
-  TreePair trees;
-  trees.a = &scene.bodies()[a].tree(by_faces ? FeatureKind::FACE : FeatureKind::EDGE);
-  trees.b = &scene.bodies()[b].tree(FeatureKind::FACE);
-  trees.span.times = Times::T0;
-  trees.adjacent = a == b;
-  trees.self = by_faces && a == b;
-  if (a == b && unfolded_) {  // what does not meet during the step does not at t=0
-    trees.parts_a = (*unfolded_)[a].parts(by_faces ? FeatureKind::FACE : FeatureKind::EDGE);
-    trees.parts_b = (*unfolded_)[a].parts(FeatureKind::FACE);
-  }
+  TreePair trees = treesOf(scene, a, b, by_faces, unfolded_);
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
   if (beforeListing(deadline).isOver()) return false;
+  if (a == b && unfolded_ && (*unfolded_)[a].isWhole()) return true;
   learnNeighbourhoods(scene);
+  for (const std::uint32_t body : next_bodies_) {
+    if (by_faces) neighbourhoods_[body].learnFaces(scene.bodies()[body]);
+  }
   const simd::KnownPairs sharing = neighbourhoods_[a].sharing.view();
   if (trees.self) trees.sharing = &sharing;
   cut_ = superclusterPairs(trees, groups_, scratch_, most_group_pairs_).toc <= 1 || cut_;

@@ -182,6 +182,42 @@ TEST_F(FallingCloth, ForgetsWhereItMust) {
   EXPECT_EQ(tested(false), full) << "a step that does not continue";
 }
 
+// What certainly does not fold crosses nothing of itself. It still crosses others, and itself once it is folded.
+TEST(StartState, ASurfaceThatCertainlyDoesNotFoldIsNotSearched) {
+  TestStep scene;
+  StepBody sheet;
+  sheet.topology = Topology::grid(8, 8);
+  sheet.t0 = gridAt(8, 8, 1);
+  sheet.t1 = movedBy(sheet.t0, Vec3(0, 0, 0.1));
+  scene.bodies = {sheet};
+  Detector detector;
+  const Outcome flat = detector.run(scene.motion());
+  ASSERT_EQ(flat.stats.unfolded_bodies, 1u);
+  EXPECT_EQ(flat.start_state, StartState::CLEAR);
+  EXPECT_EQ(flat.stats[Stage::START_STATE].in, 0u);
+
+  StepBody& folded = scene.bodies[0];
+  folded.t0 = folded.t1;
+  for (Vec3& p : folded.t1) {
+    if (p.x() > 3.5) p = Vec3(7.2 - p.x(), p.y() + 0.3, 1.5 - 0.5 * (p.x() - 3.5));
+  }
+  EXPECT_EQ(detector.run(scene.motion()).start_state, StartState::CLEAR);
+  folded.t0 = folded.t1;
+  const std::vector<StartIntersection> crossings = trueIntersections(scene);
+  ASSERT_GT(crossings.size(), 10u);
+  EXPECT_TRUE(same(detector.run(scene.motion()).intersections, crossings)) << "by what the step before touched";
+  EXPECT_TRUE(same(Detector().run(scene.motion()).intersections, crossings)) << "by the search";
+
+  StepBody upright;
+  upright.topology = Topology::fromTriangles(3, {{0, 1, 2}});
+  upright.t0 = upright.t1 = {Vec3(2.2, 2.3, 1), Vec3(2.2, 2.3, -1), Vec3(3.3, 2.4, -1)};
+  scene.bodies = {sheet, upright};
+  const Outcome crossed = Detector().run(scene.motion());
+  EXPECT_EQ(crossed.stats.unfolded_bodies, 2u);
+  EXPECT_TRUE(same(crossed.intersections, trueIntersections(scene)));
+  EXPECT_FALSE(crossed.intersections.empty());
+}
+
 // A search that is cut goes on in the next step, while everything moves: cut at any place, it lists nothing that is
 // not there, and once it has come to the end, all that is.
 TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
@@ -277,6 +313,7 @@ TEST(StartState, WithoutAFirstContactTheEndIsKnown) {
   const Positions low = step.bodies[0].t0, high = step.bodies[1].t0, through = movedBy(high, {0, 0, -0.2});
   Options options;
   options.earliest_only = true;
+  options.unfolded_test = false;  // a sheet without a fold is not searched
   History history;
   std::vector<std::uint64_t> tested;
   const std::vector<Positions> ends = {high, high, through, through, through};
