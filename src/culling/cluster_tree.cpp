@@ -53,7 +53,7 @@ std::vector<Index> spatialOrder(const std::vector<Vec3>& centres) {
 
 void AlignedRecords::resize(std::size_t n) {
   if (n <= capacity_) return;
-  data_ = hwy::AllocateAligned<std::int16_t>(n);
+  data_ = hwy::AllocateAligned<std::uint16_t>(n);
   if (!data_) throw std::bad_alloc();
   capacity_ = n;
 }
@@ -108,13 +108,13 @@ void ClusterTree::mask(const std::uint8_t* active) {
   }
 }
 
-void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+void ClusterTree::refitLeaves(const std::uint16_t* records, const std::uint16_t* margin16, std::size_t first_group,
                               std::size_t last_group) {
   simd::buildLeaves(records, boundedGroup(first_group), arity_, (last_group - first_group) * GROUP, margin16,
                     levels_[0].soa.data() + first_group * SOA_SIZE, levels_[0].aos.data() + first_group * AOS_SIZE);
 }
 
-void ClusterTree::letLeavesWait(bool wait, const std::int16_t* records) {
+void ClusterTree::letLeavesWait(bool wait, const std::uint16_t* records) {
   leaves_wait_ = wait;
   if (!wait) return;
   records_ = records;

@@ -193,7 +193,7 @@ constexpr bool WRITES_LATER = DCCD_AVX512;
 
 // A pair of groups, g and h: nodes of one are compared with lanes of the other, by rows those of g with h's.
 struct NodesAndLanes {
-  const int16_t *HWY_RESTRICT soa_of_nodes, *HWY_RESTRICT soa_of_lanes;
+  const uint16_t *HWY_RESTRICT soa_of_nodes, *HWY_RESTRICT soa_of_lanes;
   uint32_t nodes, lanes;  // masks: which may meet something
   uint32_t g, h;
   bool by_rows;
@@ -236,10 +236,10 @@ HWY_INLINE uint32_t* testNodes(const NodesAndLanes& pair, const Lanes& lanes, ui
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
                               Diagonal diagonal, const LeaveOutOf& left_out, uint32_t* HWY_RESTRICT o) {
-  const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
-  const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
-  const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
-  const int16_t* HWY_RESTRICT bound_b = b.aos + size_t{h} * AOS_SIZE;
+  const uint16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
+  const uint16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
+  const uint16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
+  const uint16_t* HWY_RESTRICT bound_b = b.aos + size_t{h} * AOS_SIZE;
   uint32_t rows = same ? 0xffffu : meeting<T0_ONLY>(bound_b, bound_b + RECORD, 1, sa);
   if (rows == 0) return o;
   uint32_t cols = same ? 0xffffu : meeting<T0_ONLY>(bound_a, bound_a + RECORD, 1, sb);
@@ -261,7 +261,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
 
 template <bool T0_ONLY>
 HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
-  const int16_t* next = view.soa + size_t{group} * SOA_SIZE;
+  const uint16_t* next = view.soa + size_t{group} * SOA_SIZE;
   for (size_t line = 0; line < SOA_SIZE; line += 32) {
     if (!T0_ONLY || line % (RECORD * GROUP) < SOA_T1) hwy::Prefetch(next + line);
   }
