@@ -6,6 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "culling/large_arrays.h"
 #include "dccd/tolerances.h"
 
 namespace dccd {
@@ -161,8 +162,7 @@ void SceneArrays::buildTrees(SceneBody& body, const Positions& rest) {
 
 void SceneArrays::makeRoom() {
   if (vertex_count_ > vertex_capacity_) {
-    vertices_ = hwy::AllocateAligned<VertexMotion>(vertex_count_);
-    if (!vertices_) throw std::bad_alloc();
+    vertices_ = makeLarge<VertexMotion>(vertex_count_);
     vertex_capacity_ = vertex_count_;
   }
   records_.resize(std::max<std::size_t>(vertex_count_, 1) * simd::RECORD);
