@@ -107,53 +107,28 @@ HWY_INLINE uint32_t meeting(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY
 }
 #endif
 
-// Which lanes of a group are looked at: all of them. Takes a vector of theirs to the vector that is looked at.
-struct AllLanes {
-  using D = hn::CappedTag<uint32_t, GROUP>;
 #if DCCD_AVX512
-  HWY_INLINE hn::Vec<D> operator()(hn::Vec<D> lanes) const { return lanes; }
-  HWY_INLINE hn::Vec<D> together(hn::Vec<D> lanes) const { return lanes; }
-#endif
-};
+using Lanes32 = hn::CappedTag<uint32_t, GROUP>;
 
-#if DCCD_AVX512
 // From a table: Iota() is written to the stack lane by lane, and read back at once.
 HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
-HWY_INLINE hn::Mask<AllLanes::D> maskOf(uint32_t bits) {
+HWY_INLINE hn::Mask<Lanes32> maskOf(uint32_t bits) {
   const uint8_t packed[8] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
-  return hn::LoadMaskBits(AllLanes::D(), packed);
+  return hn::LoadMaskBits(Lanes32(), packed);
 }
 
-// The lanes of a mask, no more than half of all, moved together: vectors of half the size take half the time.
-class FewLanes {
-  using All = AllLanes::D;
-
- public:
-  using D = hn::Half<All>;
-  HWY_INLINE explicit FewLanes(uint32_t mask)
-      : front_(hn::IndicesFromVec(All(), hn::Compress(hn::Load(All(), LANES), maskOf(mask)))) {}
-  HWY_INLINE hn::Vec<D> operator()(hn::Vec<All> lanes) const { return hn::LowerHalf(D(), together(lanes)); }
-  HWY_INLINE hn::Vec<All> together(hn::Vec<All> lanes) const { return hn::TableLookupLanes(lanes, front_); }
-
- private:
-  decltype(hn::IndicesFromVec(All(), hn::Zero(All()))) front_;
-};
-
 // The nodes of one group, kept at hand while each node of another group is compared with all of them.
-template <bool T0_ONLY, class Lanes>
+template <bool T0_ONLY>
 class GroupLanes {  // in up to 16 of the 32 registers
-  using D = hn::Repartition<uint16_t, typename Lanes::D>;
+  using D = hn::Repartition<uint16_t, Lanes32>;
 
  public:
-  HWY_INLINE GroupLanes(const uint16_t* HWY_RESTRICT group, const Lanes& lanes) {
+  HWY_INLINE explicit GroupLanes(const uint16_t* HWY_RESTRICT group) {
     for (size_t i = 0; i < RECORD; ++i) {
       // With one time alone nothing is read of the other: the callers' arrays may end before it.
       const size_t at = i * 2 * GROUP;
-      if (T0_ONLY && at % (RECORD * GROUP) >= SOA_T1) continue;
-      const AllLanes::D d;
-      vectors_[i] =
-          hn::BitCast(D(), lanes(hn::BitCast(d, hn::Load(hn::Repartition<uint16_t, decltype(d)>(), group + at))));
+      if (!T0_ONLY || at % (RECORD * GROUP) < SOA_T1) vectors_[i] = hn::Load(D(), group + at);
     }
   }
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return vectors_[at / (2 * GROUP)]; }
@@ -165,10 +140,10 @@ class GroupLanes {  // in up to 16 of the 32 registers
   hn::Vec<D> vectors_[RECORD];
 };
 #else
-template <bool T0_ONLY, class Lanes>
+template <bool T0_ONLY>
 class GroupLanes {
  public:
-  HWY_INLINE GroupLanes(const uint16_t* HWY_RESTRICT group, Lanes) : group_(group) {}
+  HWY_INLINE explicit GroupLanes(const uint16_t* HWY_RESTRICT group) : group_(group) {}
   HWY_INLINE uint32_t meets(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi) const {
     return meeting<T0_ONLY>(lo, hi, GROUP, group_);
   }
