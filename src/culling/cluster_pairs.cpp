@@ -10,8 +10,8 @@ namespace {
 
 /// superclusterTocBound() of groups of any level.
 double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::uint32_t b) {
-  const std::int16_t* x = trees.a->level(level).aos.data() + std::size_t{a} * simd::AOS_SIZE;
-  const std::int16_t* y = trees.b->level(level).aos.data() + std::size_t{b} * simd::AOS_SIZE;
+  const std::uint16_t* x = trees.a->level(level).aos.data() + std::size_t{a} * simd::AOS_SIZE;
+  const std::uint16_t* y = trees.b->level(level).aos.data() + std::size_t{b} * simd::AOS_SIZE;
   // Gap of real projections in record units: values are truncated to a unit, and the scaling's rounding is far below
   // another one. The ends of moving intervals are bounded by straight lines between the bounds at t0 and t1.
   const auto firstMeeting = [](int gap0, int gap1) {
@@ -24,8 +24,9 @@ double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::
   double latest = 0;
   for (int d = 0; d < 8; ++d) {
     const int HI = simd::RECORD;
-    latest = std::max(latest, firstMeeting(x[d] - y[HI + d], x[8 + d] - y[HI + 8 + d]));
-    latest = std::max(latest, firstMeeting(y[d] - x[HI + d], y[8 + d] - x[HI + 8 + d]));
+    const auto gap = [](std::uint16_t smallest, std::uint16_t largest) { return smallest - simd::turned(largest); };
+    latest = std::max(latest, firstMeeting(gap(x[d], y[HI + d]), gap(x[8 + d], y[HI + 8 + d])));
+    latest = std::max(latest, firstMeeting(gap(y[d], x[HI + d]), gap(y[8 + d], x[HI + 8 + d])));
   }
   return latest * trees.span.end;
 }

@@ -4,6 +4,8 @@
 #include <numeric>
 #include <thread>
 
+#include "culling/large_arrays.h"
+
 namespace dccd {
 namespace {
 
@@ -53,8 +55,7 @@ std::vector<Index> spatialOrder(const std::vector<Vec3>& centres) {
 
 void AlignedRecords::resize(std::size_t n) {
   if (n <= capacity_) return;
-  data_ = hwy::AllocateAligned<std::int16_t>(n);
-  if (!data_) throw std::bad_alloc();
+  data_ = makeLarge<std::uint16_t>(n);
   capacity_ = n;
 }
 
@@ -64,8 +65,7 @@ void ClusterTree::build(std::vector<Index> features, std::size_t arity) {
   features_ = std::move(features);
   features_.resize(std::max(roundUp(feature_count_), GROUP) * arity, NO_INDEX);
   features_.shrink_to_fit();
-  lanes_ = hwy::AllocateAligned<Index>(features_.size());
-  if (!lanes_) throw std::bad_alloc();
+  lanes_ = makeLarge<Index>(features_.size());
   for (std::size_t slot = 0; slot < features_.size() / arity; ++slot) {
     for (std::size_t k = 0; k < arity; ++k) {
       lanes_[(slot / GROUP * arity + k) * GROUP + slot % GROUP] = features_[slot * arity + k];
@@ -108,13 +108,13 @@ void ClusterTree::mask(const std::uint8_t* active) {
   }
 }
 
-void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+void ClusterTree::refitLeaves(const std::uint16_t* records, const std::uint16_t* margin16, std::size_t first_group,
                               std::size_t last_group) {
   simd::buildLeaves(records, boundedGroup(first_group), arity_, (last_group - first_group) * GROUP, margin16,
                     levels_[0].soa.data() + first_group * SOA_SIZE, levels_[0].aos.data() + first_group * AOS_SIZE);
 }
 
-void ClusterTree::letLeavesWait(bool wait, const std::int16_t* records) {
+void ClusterTree::letLeavesWait(bool wait, const std::uint16_t* records) {
   leaves_wait_ = wait;
   if (!wait) return;
   records_ = records;

@@ -18,15 +18,15 @@ namespace dccd {
 /// items is compact: recursive median splits of the longest side, at multiples of 16^k. Deterministic.
 std::vector<Index> spatialOrder(const std::vector<Vec3>& centres);
 
-/// int16 arrays aligned for vector loads; grows only.
+/// uint16 arrays aligned for vector loads; grows only.
 class AlignedRecords {
  public:
   void resize(std::size_t n);
-  std::int16_t* data() { return data_.get(); }
-  const std::int16_t* data() const { return data_.get(); }
+  std::uint16_t* data() { return data_.get(); }
+  const std::uint16_t* data() const { return data_.get(); }
 
  private:
-  hwy::AlignedFreeUniquePtr<std::int16_t[]> data_;
+  hwy::AlignedFreeUniquePtr<std::uint16_t[]> data_;
   std::size_t capacity_ = 0;
 };
 
@@ -61,11 +61,11 @@ class ClusterTree {
   void mask(const std::uint8_t* active);
 
   /// Recomputes all bounds from the vertices' records. margin16: see simd::buildLeaves.
-  void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+  void refitLeaves(const std::uint16_t* records, const std::uint16_t* margin16, std::size_t first_group,
                    std::size_t last_group);
   /// Before a refit. wait: refitGroups() follows in the place of refitLeaves(), and needLeaves() makes the leaves of
   /// those groups that are asked for, from the same records, without margins.
-  void letLeavesWait(bool wait, const std::int16_t* records);
+  void letLeavesWait(bool wait, const std::uint16_t* records);
   void refitGroups(std::size_t first_group, std::size_t last_group);
   void refitUpper();
   /// Before a group of leaves is looked at. Of any number of threads one makes them, and the others wait for it.
@@ -111,7 +111,7 @@ class ClusterTree {
   std::vector<Index> masked_;                 // the same with left-out ones NO_INDEX; empty when nothing is left out
   mutable std::vector<Level> levels_;         // that of leaves is made when it is asked for
   bool leaves_wait_ = false;                  // some of them may, for
-  const std::int16_t* records_ = nullptr;
+  const std::uint16_t* records_ = nullptr;
   mutable std::vector<std::atomic<std::uint8_t>> made_;  // per group of leaves
 };
 

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "culling/large_arrays.h"
 #include "dccd/tolerances.h"
 
 namespace dccd {
@@ -161,8 +162,7 @@ void SceneArrays::buildTrees(SceneBody& body, const Positions& rest) {
 
 void SceneArrays::makeRoom() {
   if (vertex_count_ > vertex_capacity_) {
-    vertices_ = hwy::AllocateAligned<VertexMotion>(vertex_count_);
-    if (!vertices_) throw std::bad_alloc();
+    vertices_ = makeLarge<VertexMotion>(vertex_count_);
     vertex_capacity_ = vertex_count_;
   }
   records_.resize(std::max<std::size_t>(vertex_count_, 1) * simd::RECORD);
@@ -239,16 +239,12 @@ void SceneArrays::refitBodies() {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     // All three trees: a feature is widened by the largest radius of its vertices, which may lie in another group of
     // vertices than the feature's outermost one. An empty tree's bounds are neutral.
-    std::int16_t* bounds = body_bounds_.data() + b * simd::AOS_SIZE;
-    std::fill_n(bounds, simd::RECORD, simd::EMPTY_LO);
-    std::fill_n(bounds + simd::RECORD, simd::RECORD, simd::EMPTY_HI);
+    std::uint16_t* bounds = body_bounds_.data() + b * simd::AOS_SIZE;
+    std::fill_n(bounds, simd::AOS_SIZE, simd::EMPTY);
     if (bodies_[b].far) continue;
     for (const ClusterTree& tree : bodies_[b].trees) {
-      const std::int16_t* top = tree.level(height_ - 1).aos.data();
-      for (std::size_t k = 0; k < simd::RECORD; ++k) {
-        bounds[k] = std::min(bounds[k], top[k]);
-        bounds[simd::RECORD + k] = std::max(bounds[simd::RECORD + k], top[simd::RECORD + k]);
-      }
+      const std::uint16_t* top = tree.level(height_ - 1).aos.data();
+      for (std::size_t k = 0; k < simd::AOS_SIZE; ++k) bounds[k] = std::min(bounds[k], top[k]);
     }
   }
   simd::buildUpper(body_bounds_.data(), bodies_.size(), body_levels_[0].soa.data(), body_levels_[0].aos.data());

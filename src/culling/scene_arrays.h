@@ -55,7 +55,7 @@ struct SceneBody {
   bool recorded = false;          ///< it has been through a step since it was set
   double reach_m = 0;             ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
-  std::int16_t margin[16] = {};                   ///< reach_m in record units
+  std::uint16_t margin[16] = {};                  ///< reach_m in record units
   bool sewn = false;                              ///< it has a border by its numbers alone: its seams hold in this step
   bool sewn_known = false;                        ///< for the vertices as they are
   Seams seams;                                    ///< by which it is sewn, or was
@@ -167,7 +167,7 @@ class SceneArrays {
   const std::vector<SceneBody>& bodies() const { return bodies_; }
   const VertexMotion* vertices() const { return vertices_.get(); }
   /// The RECORD values of an internal vertex, after refit().
-  const std::int16_t* record(Index internal) const { return records_.data() + internal * simd::RECORD; }
+  const std::uint16_t* record(Index internal) const { return records_.data() + internal * simd::RECORD; }
   std::size_t vertexCount() const { return vertex_count_; }
   /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
   void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
@@ -236,7 +236,7 @@ class SceneArrays {
   void endRecord(bool any_kept);
   bool recordRadii(SceneBody& body, const Body& motion);
   void setRange(bool keep);
-  void setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const;
+  void setMargin(const SceneBody& body, double reach_m, std::uint16_t* margin16) const;
   std::int32_t endOf(double until) const;
   bool isStill(const SceneBody& body) const;
   bool isFar(std::size_t b) const;

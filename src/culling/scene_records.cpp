@@ -363,9 +363,9 @@ void SceneArrays::setRange(bool keep) {
 /// and by its own radii; the sum of the two margins is never less than what the pair asks for, since a margin that does
 /// not fit is UNBOUNDED. (Cut off at half the range, one alone would not reach from one end of the records to the
 /// other.)
-void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const {
+void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::uint16_t* margin16) const {
   if (!(reach_m > 0) && body.reach_m == 0) {
-    std::fill_n(margin16, 16, std::int16_t{0});
+    std::fill_n(margin16, 16, std::uint16_t{0});
     return;
   }
   for (int k = 0; k < 16; ++k) {
@@ -377,7 +377,7 @@ void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t*
     const double rounding =
         tolerance::RECORD_MARGIN * std::max(std::abs(range_min_[d]), std::abs(range_max_[d])) * scale_[d];
     const double units = std::ceil(reach_m * length * scale_[d] + rounding) + 1;
-    margin16[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min<double>(units, simd::UNBOUNDED) : 0);
+    margin16[k] = static_cast<std::uint16_t>(scale_[d] > 0 ? std::min<double>(units, simd::UNBOUNDED) : 0);
   }
 }
 
@@ -389,7 +389,7 @@ void SceneArrays::quantize(std::size_t first, std::size_t last) {
 void SceneArrays::refitLeaves(const SceneBody& body, ClusterTree& tree, std::size_t first, std::size_t last) const {
   if (!body.uncertain) return tree.refitLeaves(records_.data(), body.reach_m > 0 ? body.margin : nullptr, first, last);
   // Only groups with an uncertain vertex are widened further, by the largest radius in them.
-  std::int16_t margin[16];
+  std::uint16_t margin[16];
   for (std::size_t group = first; group < last; ++group) {
     const std::size_t end = std::min((group + 1) * simd::GROUP, tree.featureCount()) * tree.arity();
     double radius = 0;

@@ -63,7 +63,7 @@ void ProjectionBounds(const double* HWY_RESTRICT vertices, size_t n, double* HWY
 }
 
 void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_RESTRICT low8,
-              const double* HWY_RESTRICT scale8, int16_t* HWY_RESTRICT records) {
+              const double* HWY_RESTRICT scale8, uint16_t* HWY_RESTRICT records) {
   const Ends d;
   const hn::Rebind<int32_t, Ends> di;
   // Two directions in 32 bits, so that those of a point come to lie side by side.
@@ -75,27 +75,25 @@ void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_R
       // A sum that overflowed meets a scale of 0 only; the direction then says nothing about any vertex. What lies
       // outside the range (a body without any active vertex) takes its end, which keeps the order, too.
       const auto whole = hn::DemoteTo(di, hn::IfThenElseZero(hn::Gt(hn::Set(d, scale8[k]), hn::Zero(d)), value));
-      return hn::Sub(hn::Clamp(whole, hn::Zero(di), hn::Set(di, static_cast<int32_t>(RECORD_RANGE))),
-                     hn::Set(di, 32764));
+      return hn::Add(hn::Clamp(whole, hn::Zero(di), hn::Set(di, static_cast<int32_t>(RECORD_RANGE))),
+                     hn::Set(di, RECORD_LOWEST));
     };
-    const auto two = [&](size_t k) HWY_ATTR {
-      return hn::Or(hn::And(record(k), hn::Set(di, 0xffff)), hn::ShiftLeft<16>(record(k + 1)));
-    };
+    const auto two = [&](size_t k) HWY_ATTR { return hn::Or(record(k), hn::ShiftLeft<16>(record(k + 1))); };
     const size_t lanes = hn::Lanes(d), count = std::min(lanes, 2 * n);
     HWY_ALIGN int32_t last[4 * 8];
     int32_t* const to = count < lanes ? last : reinterpret_cast<int32_t*>(records + DIRECTIONS * first);
     hn::StoreInterleaved4(two(0), two(2), two(4), two(6), di, to);
-    if (count < lanes) std::memcpy(records, last, count * DIRECTIONS * sizeof(int16_t));
+    if (count < lanes) std::memcpy(records, last, count * DIRECTIONS * sizeof(uint16_t));
   });
 }
 
 // rows: 16 rows of 16 values. A lane's two neighbouring directions stay side by side (soaIndex()).
-HWY_INLINE void transposePairs(const int16_t* HWY_RESTRICT rows, int16_t* HWY_RESTRICT out) {
+HWY_INLINE void transposePairs(const uint16_t* HWY_RESTRICT rows, uint16_t* HWY_RESTRICT out) {
 #if HWY_TARGET == HWY_SCALAR
   for (size_t i = 0; i < GROUP; ++i)
     for (size_t k = 0; k < RECORD; ++k) out[soaIndex(k, i)] = rows[i * RECORD + k];
 #else
-  const hn::FixedTag<int16_t, 8> d;
+  const hn::FixedTag<uint16_t, 8> d;
   const hn::RepartitionToWide<decltype(d)> d32;
   const hn::RepartitionToWide<decltype(d32)> d64;
   const auto wide = [&](hn::Vec<decltype(d32)> v) { return hn::BitCast(d64, v); };
@@ -115,18 +113,20 @@ HWY_INLINE void transposePairs(const int16_t* HWY_RESTRICT rows, int16_t* HWY_RE
 #endif
 }
 
-using D16 = hn::CappedTag<int16_t, 16>;
+using D16 = hn::CappedTag<uint16_t, 16>;
+
+HWY_INLINE hn::Vec<D16> turned(hn::Vec<D16> values) { return hn::Sub(hn::Set(D16(), EMPTY), values); }
 
 // lo and hi: 16 rows of 16 values each.
-HWY_INLINE void finishGroup(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, int16_t* HWY_RESTRICT soa,
-                            int16_t* HWY_RESTRICT aos) {
+HWY_INLINE void finishGroup(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi,
+                            uint16_t* HWY_RESTRICT soa, uint16_t* HWY_RESTRICT aos) {
   const D16 d;
   for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
     auto small = hn::Load(d, lo + k);
     auto large = hn::Load(d, hi + k);
     for (size_t i = 1; i < GROUP; ++i) {
       small = hn::Min(small, hn::Load(d, lo + i * RECORD + k));
-      large = hn::Max(large, hn::Load(d, hi + i * RECORD + k));
+      large = hn::Min(large, hn::Load(d, hi + i * RECORD + k));
     }
     hn::StoreU(small, d, aos + k);
     hn::StoreU(large, d, aos + RECORD + k);
@@ -135,12 +135,11 @@ HWY_INLINE void finishGroup(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
   transposePairs(hi, soa + RECORD * GROUP);
 }
 
-// Smallest and largest values k of a feature, widened by the margins; of an empty lane the empty values.
+// Smallest and (turned) largest values k of a feature, widened by the margins; of an empty lane the empty value.
 template <class D, class V>
-HWY_INLINE void boundFeature(D d, const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT f, size_t arity,
-                             const int16_t* HWY_RESTRICT margin16, size_t k, V& small, V& large) {
-  small = hn::Set(d, EMPTY_LO);
-  large = hn::Set(d, EMPTY_HI);
+HWY_INLINE void boundFeature(D d, const uint16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT f, size_t arity,
+                             const uint16_t* HWY_RESTRICT margin16, size_t k, V& small, V& large) {
+  small = large = hn::Set(d, EMPTY);
   if (f[0] == UINT32_MAX) return;
   small = large = hn::LoadU(d, records + RECORD * size_t{f[0]} + k);
   for (size_t j = 1; j < arity; ++j) {
@@ -148,22 +147,21 @@ HWY_INLINE void boundFeature(D d, const int16_t* HWY_RESTRICT records, const uin
     small = hn::Min(small, r);
     large = hn::Max(large, r);
   }
+  large = turned(large);
   if (!margin16) return;
-  // Saturation at the empty values would hide a feature; the record range leaves room on both sides. What ends there
-  // reaches every record, which all lie within; but a margin of half the range reaches no end from the other one, so
-  // that what is cut off at UNBOUNDED goes there outright.
-  const auto m = hn::LoadU(d, margin16 + k);
-  const auto lowest = hn::Set(d, int16_t{-32766}), highest = hn::Set(d, int16_t{32766});
+  // What is cut off at the lowest value reaches every record, which all lie above; but a margin of half the range
+  // reaches no end from the other one, so that what is cut off at UNBOUNDED goes there outright.
+  const auto m = hn::LoadU(d, margin16 + k), lowest = hn::Set(d, uint16_t{1});
   const auto unbounded = hn::Eq(m, hn::Set(d, UNBOUNDED));
   small = hn::IfThenElse(unbounded, lowest, hn::Max(hn::SaturatedSub(small, m), lowest));
-  large = hn::IfThenElse(unbounded, highest, hn::Min(hn::SaturatedAdd(large, m), highest));
+  large = hn::IfThenElse(unbounded, lowest, hn::Max(hn::SaturatedSub(large, m), lowest));
 }
 
-void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
-                 const int16_t* HWY_RESTRICT margin16, int16_t* HWY_RESTRICT soa, int16_t* HWY_RESTRICT aos) {
+void BuildLeaves(const uint16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
+                 const uint16_t* HWY_RESTRICT margin16, uint16_t* HWY_RESTRICT soa, uint16_t* HWY_RESTRICT aos) {
   const D16 d;
-  HWY_ALIGN int16_t lo[GROUP * RECORD];
-  HWY_ALIGN int16_t hi[GROUP * RECORD];
+  HWY_ALIGN uint16_t lo[GROUP * RECORD];
+  HWY_ALIGN uint16_t hi[GROUP * RECORD];
   for (size_t g = 0; g < count / GROUP; ++g) {
     for (size_t i = 0; i < GROUP; ++i) {
       for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
@@ -178,13 +176,13 @@ void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRI
 }
 
 template <size_t ARITY>
-HWY_INLINE void boundGroups(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t count,
-                            int16_t* HWY_RESTRICT aos) {
+HWY_INLINE void boundGroups(const uint16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t count,
+                            uint16_t* HWY_RESTRICT aos) {
   const D16 d;
   for (const uint32_t* end = indices + count * ARITY; indices != end; indices += GROUP * ARITY, aos += AOS_SIZE) {
     for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
       // Of every other feature, so that half of the comparisons do not wait for the other half.
-      auto small = hn::Set(d, EMPTY_LO), large = hn::Set(d, EMPTY_HI), other_small = small, other_large = large;
+      auto small = hn::Set(d, EMPTY), large = turned(small), other_small = small, other_large = large;
       const auto add = [&](const uint32_t* f, hn::Vec<D16>& lo, hn::Vec<D16>& hi) HWY_ATTR {
         for (size_t j = 0; f[0] != UINT32_MAX && j < ARITY; ++j) {
           const auto r = hn::LoadU(d, records + RECORD * size_t{f[j]} + k);
@@ -197,61 +195,60 @@ HWY_INLINE void boundGroups(const int16_t* HWY_RESTRICT records, const uint32_t*
         add(indices + (i + 1) * ARITY, other_small, other_large);
       }
       hn::StoreU(hn::Min(small, other_small), d, aos + k);
-      hn::StoreU(hn::Max(large, other_large), d, aos + RECORD + k);
+      hn::StoreU(turned(hn::Max(large, other_large)), d, aos + RECORD + k);
     }
   }
 }
 
-void BoundGroups(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
-                 int16_t* HWY_RESTRICT aos) {
+void BoundGroups(const uint16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
+                 uint16_t* HWY_RESTRICT aos) {
   if (arity == 1) return boundGroups<1>(records, indices, count, aos);
   if (arity == 2) return boundGroups<2>(records, indices, count, aos);
   boundGroups<3>(records, indices, count, aos);
 }
 
-void BuildUpper(const int16_t* HWY_RESTRICT child_aos, size_t child_count, int16_t* HWY_RESTRICT soa,
-                int16_t* HWY_RESTRICT aos) {
-  HWY_ALIGN int16_t lo[GROUP * RECORD];
-  HWY_ALIGN int16_t hi[GROUP * RECORD];
+void BuildUpper(const uint16_t* HWY_RESTRICT child_aos, size_t child_count, uint16_t* HWY_RESTRICT soa,
+                uint16_t* HWY_RESTRICT aos) {
+  HWY_ALIGN uint16_t lo[GROUP * RECORD];
+  HWY_ALIGN uint16_t hi[GROUP * RECORD];
   for (size_t g = 0; g * GROUP < child_count; ++g) {
     for (size_t i = 0; i < GROUP; ++i) {
       const size_t c = g * GROUP + i;
       if (c < child_count) {
-        std::memcpy(lo + i * RECORD, child_aos + c * AOS_SIZE, RECORD * sizeof(int16_t));
-        std::memcpy(hi + i * RECORD, child_aos + c * AOS_SIZE + RECORD, RECORD * sizeof(int16_t));
+        std::memcpy(lo + i * RECORD, child_aos + c * AOS_SIZE, RECORD * sizeof(uint16_t));
+        std::memcpy(hi + i * RECORD, child_aos + c * AOS_SIZE + RECORD, RECORD * sizeof(uint16_t));
       } else {
-        std::fill_n(lo + i * RECORD, RECORD, EMPTY_LO);
-        std::fill_n(hi + i * RECORD, RECORD, EMPTY_HI);
+        std::fill_n(lo + i * RECORD, RECORD, EMPTY);
+        std::fill_n(hi + i * RECORD, RECORD, EMPTY);
       }
     }
     finishGroup(lo, hi, soa + g * SOA_SIZE, aos + g * AOS_SIZE);
   }
 }
 
-// n values (a multiple of 8) at t0 and t1: the latter become those at `end`, rounded outwards and one further, or where
-// they are swept, the outermost of both. What is empty stays outside of what any record can be.
-template <bool LARGEST>
-HWY_INLINE void shorten(const int16_t* HWY_RESTRICT at0, int16_t* HWY_RESTRICT at1, size_t n, int32_t end, bool swept) {
+// n values (a multiple of 8) at t0 and t1: the latter become those at `end`, rounded down and one further, or where
+// they are swept, the smaller of both. What is empty becomes 65533, and the largest of a record 65532 at most.
+HWY_INLINE void shorten(const uint16_t* HWY_RESTRICT at0, uint16_t* HWY_RESTRICT at1, size_t n, int32_t end,
+                        bool swept) {
   const hn::CappedTag<int32_t, 8> d32;
-  const hn::Rebind<int16_t, decltype(d32)> d16;
+  const hn::Rebind<uint16_t, decltype(d32)> d16;
   const auto share = hn::Set(d32, end), one = hn::Set(d32, 1);
   for (size_t i = 0; i < n; i += hn::Lanes(d32)) {
     const auto from = hn::PromoteTo(d32, hn::LoadU(d16, at0 + i)), to = hn::PromoteTo(d32, hn::LoadU(d16, at1 + i));
     // Differences are below 2^16 less a few, so that no product overflows.
-    const auto moved = LARGEST ? hn::Add(hn::Sub(from, hn::ShiftRight<15>(hn::Mul(hn::Sub(from, to), share))), one)
-                               : hn::Sub(hn::Add(from, hn::ShiftRight<15>(hn::Mul(hn::Sub(to, from), share))), one);
-    const auto outermost = LARGEST ? hn::Max(from, moved) : hn::Min(from, moved);
-    hn::StoreU(hn::DemoteTo(d16, swept ? outermost : moved), d16, at1 + i);
+    const auto moved = hn::Sub(hn::Add(from, hn::ShiftRight<15>(hn::Mul(hn::Sub(to, from), share))), one);
+    hn::StoreU(hn::DemoteTo(d16, swept ? hn::Min(from, moved) : moved), d16, at1 + i);
   }
 }
 
-void ShortenBounds(int16_t* HWY_RESTRICT soa, int16_t* HWY_RESTRICT aos, size_t groups, int32_t end, bool swept) {
+void ShortenBounds(uint16_t* HWY_RESTRICT soa, uint16_t* HWY_RESTRICT aos, size_t groups, int32_t end, bool swept) {
   constexpr size_t HALF = RECORD * GROUP;
   for (size_t g = 0; g < groups; ++g, soa += SOA_SIZE, aos += AOS_SIZE) {
-    shorten<false>(soa, soa + SOA_T1, SOA_T1, end, swept);
-    shorten<true>(soa + HALF, soa + HALF + SOA_T1, SOA_T1, end, swept);
-    shorten<false>(aos, aos + DIRECTIONS, DIRECTIONS, end, swept);
-    shorten<true>(aos + RECORD, aos + RECORD + DIRECTIONS, DIRECTIONS, end, swept);
+    for (size_t half = 0; half < 2; ++half) {
+      uint16_t *HWY_RESTRICT of_lanes = soa + half * HALF, *HWY_RESTRICT of_group = aos + half * RECORD;
+      shorten(of_lanes, of_lanes + SOA_T1, SOA_T1, end, swept);
+      shorten(of_group, of_group + DIRECTIONS, DIRECTIONS, end, swept);
+    }
   }
 }
 
@@ -273,21 +270,21 @@ HWY_EXPORT(ShortenBounds);
 void projectionBounds(const double* vertices, std::size_t n, double* min8, double* max8) {
   HWY_DYNAMIC_DISPATCH(ProjectionBounds)(vertices, n, min8, max8);
 }
-void quantize(const double* vertices, std::size_t n, const double* low8, const double* scale8, std::int16_t* records) {
+void quantize(const double* vertices, std::size_t n, const double* low8, const double* scale8, std::uint16_t* records) {
   HWY_DYNAMIC_DISPATCH(Quantize)(vertices, n, low8, scale8, records);
 }
-void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
-                 const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos) {
+void buildLeaves(const std::uint16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 const std::uint16_t* margin16, std::uint16_t* soa, std::uint16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildLeaves)(records, indices, arity, count, margin16, soa, aos);
 }
-void boundGroups(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
-                 std::int16_t* aos) {
+void boundGroups(const std::uint16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 std::uint16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BoundGroups)(records, indices, arity, count, aos);
 }
-void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos) {
+void buildUpper(const std::uint16_t* child_aos, std::size_t child_count, std::uint16_t* soa, std::uint16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildUpper)(child_aos, child_count, soa, aos);
 }
-void shortenBounds(std::int16_t* soa, std::int16_t* aos, std::size_t groups, std::int32_t end, bool swept) {
+void shortenBounds(std::uint16_t* soa, std::uint16_t* aos, std::size_t groups, std::int32_t end, bool swept) {
   HWY_DYNAMIC_DISPATCH(ShortenBounds)(soa, aos, groups, end, swept);
 }
 

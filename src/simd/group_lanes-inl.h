@@ -31,12 +31,12 @@ HWY_INLINE uint32_t bitsOf(D d, M mask) {
 }
 
 // Bit per lane: 1 where the node may meet the lane's node. It does not where both nodes' values are strictly in order
-// in a direction, the same way round at t0 and t1. lo and hi point at the 16 values of one node, of which each two
-// neighbours are `stride` dwords after those before.
+// in a direction, the same way round at t0 and t1. lo and hi point at the 16 values of one node (hi at the turned
+// ones), of which each two neighbours are `stride` dwords after those before.
 #if HWY_TARGET == HWY_SCALAR
 template <bool T0_ONLY>
-HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
-                            const int16_t* HWY_RESTRICT lanes) {
+HWY_INLINE uint32_t meeting(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi, size_t stride,
+                            const uint16_t* HWY_RESTRICT lanes) {
   constexpr size_t HALF = RECORD * GROUP;
   uint32_t bits = 0;
   for (size_t lane = 0; lane < GROUP; ++lane) {
@@ -44,8 +44,10 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
     for (size_t k = 0; k < DIRECTIONS && !apart; ++k) {
       const size_t node0 = 2 * (k / 2) * stride + k % 2, node1 = node0 + DIRECTIONS * stride;
       const size_t lane0 = soaIndex(k, lane), lane1 = soaIndex(DIRECTIONS + k, lane);
-      const bool above = lo[node0] > lanes[HALF + lane0] && (T0_ONLY || lo[node1] > lanes[HALF + lane1]);
-      const bool below = lanes[lane0] > hi[node0] && (T0_ONLY || lanes[lane1] > hi[node1]);
+      const auto isAbove = [](uint16_t one, uint16_t other) { return one > turned(other); };
+      const bool above =
+          isAbove(lo[node0], lanes[HALF + lane0]) && (T0_ONLY || isAbove(lo[node1], lanes[HALF + lane1]));
+      const bool below = isAbove(lanes[lane0], hi[node0]) && (T0_ONLY || isAbove(lanes[lane1], hi[node1]));
       apart = above || below;
     }
     bits |= static_cast<uint32_t>(!apart) << lane;
@@ -55,7 +57,7 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
 #else
 // Both values of a direction pair in all lanes.
 template <class D>
-HWY_INLINE hn::Vec<D> both(D d, const int16_t* HWY_RESTRICT two) {
+HWY_INLINE hn::Vec<D> both(D d, const uint16_t* HWY_RESTRICT two) {
   int32_t pair;
   std::memcpy(&pair, two, sizeof pair);
   return hn::BitCast(d, hn::Set(hn::RepartitionToWide<D>(), pair));
@@ -64,70 +66,39 @@ HWY_INLINE hn::Vec<D> both(D d, const int16_t* HWY_RESTRICT two) {
 // The values of a group's nodes, a vector of each two directions, side by side.
 template <class D>
 struct InMemory {
-  const int16_t* HWY_RESTRICT lanes;
+  const uint16_t* HWY_RESTRICT lanes;
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return hn::Load(D(), lanes + at); }
 };
 
-// Negative where `apart` is negative, and where both of the others are. With AVX-512 only the sign bits mean anything:
-// one instruction puts three of them together, and more of a processor's units do that than take minima.
-template <class V>
-HWY_INLINE V apartAlso(V apart, V one, V other) {
-#if DCCD_AVX512
-  return hn::OrAnd(apart, one, other);
-#else
-  return hn::Min(apart, hn::Max(one, other));
-#endif
-}
-
-// Negative where one of them is, as above.
-template <class V>
-HWY_INLINE V apartAlsoAtOnce(V apart, V one, V other) {
-#if DCCD_AVX512
-  return hn::Or3(apart, one, other);
-#else
-  return hn::Min(apart, hn::Min(one, other));
-#endif
-}
-
-// Bit per lane of two directions: 1 where neither is negative. Without AVX-512 `apart` is never positive: it begins as
-// zero and only takes minima, so that what is not negative is zero.
-template <class D>
-HWY_INLINE uint32_t notApart(D d, hn::Vec<D> apart) {
-#if DCCD_AVX512
-  apart = hn::And(apart, hn::SignBit(d));
-#endif
-  const hn::RepartitionToWide<D> d32;
-  return bitsOf(d32, hn::Eq(hn::BitCast(d32, apart), hn::Zero(d32)));
-}
-
-// Negative in the lanes that are apart in direction k, or were before. A saturated difference has the true one's sign.
+// The highest bit is set in the lanes that are apart in direction k, or were before. No other bit means anything.
 template <bool T0_ONLY, class D, class Lanes>
-HWY_INLINE hn::Vec<D> apartIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
+HWY_INLINE hn::Vec<D> apartIn(D d, size_t k, const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi,
                               size_t stride, const Lanes& lanes, hn::Vec<D> apart) {
   const size_t smallest = soaIndex(k, 0), largest = smallest + RECORD * GROUP;
-  const auto above0 = hn::SaturatedSub(lanes(largest), both(d, lo + k * stride));
-  const auto below0 = hn::SaturatedSub(both(d, hi + k * stride), lanes(smallest));
-  if (T0_ONLY) return apartAlsoAtOnce(apart, above0, below0);
+  const auto above0 = hn::AverageRound(lanes(largest), both(d, lo + k * stride));
+  const auto below0 = hn::AverageRound(both(d, hi + k * stride), lanes(smallest));
+  if (T0_ONLY) return hn::Or3(apart, above0, below0);
   const size_t t1 = (DIRECTIONS + k) * stride;
-  const auto above1 = hn::SaturatedSub(lanes(largest + SOA_T1), both(d, lo + t1));
-  const auto below1 = hn::SaturatedSub(both(d, hi + t1), lanes(smallest + SOA_T1));
-  return apartAlso(apartAlso(apart, above0, above1), below0, below1);
+  const auto above1 = hn::AverageRound(lanes(largest + SOA_T1), both(d, lo + t1));
+  const auto below1 = hn::AverageRound(both(d, hi + t1), lanes(smallest + SOA_T1));
+  return hn::OrAnd(hn::OrAnd(apart, above0, above1), below0, below1);
 }
 
 template <bool T0_ONLY, class D, class Lanes>
-HWY_INLINE uint32_t meetingIn(D d, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
+HWY_INLINE uint32_t meetingIn(D d, const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi, size_t stride,
                               const Lanes& lanes) {
   auto apart = apartIn<T0_ONLY>(d, 0, lo, hi, stride, lanes, hn::Zero(d));
   apart = apartIn<T0_ONLY>(d, 2, lo, hi, stride, lanes, apart);
   apart = apartIn<T0_ONLY>(d, 4, lo, hi, stride, lanes, apart);
-  apart = apartIn<T0_ONLY>(d, 6, lo, hi, stride, lanes, apart);
-  return notApart(d, apart);
+  apart = hn::And(apartIn<T0_ONLY>(d, 6, lo, hi, stride, lanes, apart), hn::Set(d, uint16_t{0x8000}));
+  const hn::RepartitionToWide<D> d32;  // two directions of a lane
+  return bitsOf(d32, hn::Eq(hn::BitCast(d32, apart), hn::Zero(d32)));
 }
 
 template <bool T0_ONLY>
-HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
-                            const int16_t* HWY_RESTRICT lanes) {
-  const hn::CappedTag<int16_t, 2 * GROUP> d;
+HWY_INLINE uint32_t meeting(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi, size_t stride,
+                            const uint16_t* HWY_RESTRICT lanes) {
+  const hn::CappedTag<uint16_t, 2 * GROUP> d;
   uint32_t bits = 0;
   for (size_t part = 0; part < 2 * GROUP; part += hn::Lanes(d)) {
     bits |= meetingIn<T0_ONLY>(d, lo, hi, stride, InMemory<decltype(d)>{lanes + part}) << (part / 2);
@@ -136,57 +107,32 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
 }
 #endif
 
-// Which lanes of a group are looked at: all of them. Takes a vector of theirs to the vector that is looked at.
-struct AllLanes {
-  using D = hn::CappedTag<uint32_t, GROUP>;
 #if DCCD_AVX512
-  HWY_INLINE hn::Vec<D> operator()(hn::Vec<D> lanes) const { return lanes; }
-  HWY_INLINE hn::Vec<D> together(hn::Vec<D> lanes) const { return lanes; }
-#endif
-};
+using Lanes32 = hn::CappedTag<uint32_t, GROUP>;
 
-#if DCCD_AVX512
 // From a table: Iota() is written to the stack lane by lane, and read back at once.
 HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
-HWY_INLINE hn::Mask<AllLanes::D> maskOf(uint32_t bits) {
+HWY_INLINE hn::Mask<Lanes32> maskOf(uint32_t bits) {
   const uint8_t packed[8] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
-  return hn::LoadMaskBits(AllLanes::D(), packed);
+  return hn::LoadMaskBits(Lanes32(), packed);
 }
 
-// The lanes of a mask, no more than half of all, moved together: vectors of half the size take half the time.
-class FewLanes {
-  using All = AllLanes::D;
-
- public:
-  using D = hn::Half<All>;
-  HWY_INLINE explicit FewLanes(uint32_t mask)
-      : front_(hn::IndicesFromVec(All(), hn::Compress(hn::Load(All(), LANES), maskOf(mask)))) {}
-  HWY_INLINE hn::Vec<D> operator()(hn::Vec<All> lanes) const { return hn::LowerHalf(D(), together(lanes)); }
-  HWY_INLINE hn::Vec<All> together(hn::Vec<All> lanes) const { return hn::TableLookupLanes(lanes, front_); }
-
- private:
-  decltype(hn::IndicesFromVec(All(), hn::Zero(All()))) front_;
-};
-
 // The nodes of one group, kept at hand while each node of another group is compared with all of them.
-template <bool T0_ONLY, class Lanes>
+template <bool T0_ONLY>
 class GroupLanes {  // in up to 16 of the 32 registers
-  using D = hn::Repartition<int16_t, typename Lanes::D>;
+  using D = hn::Repartition<uint16_t, Lanes32>;
 
  public:
-  HWY_INLINE GroupLanes(const int16_t* HWY_RESTRICT group, const Lanes& lanes) {
+  HWY_INLINE explicit GroupLanes(const uint16_t* HWY_RESTRICT group) {
     for (size_t i = 0; i < RECORD; ++i) {
       // With one time alone nothing is read of the other: the callers' arrays may end before it.
       const size_t at = i * 2 * GROUP;
-      if (T0_ONLY && at % (RECORD * GROUP) >= SOA_T1) continue;
-      const AllLanes::D d;
-      vectors_[i] =
-          hn::BitCast(D(), lanes(hn::BitCast(d, hn::Load(hn::Repartition<int16_t, decltype(d)>(), group + at))));
+      if (!T0_ONLY || at % (RECORD * GROUP) < SOA_T1) vectors_[i] = hn::Load(D(), group + at);
     }
   }
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return vectors_[at / (2 * GROUP)]; }
-  HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
+  HWY_INLINE uint32_t meets(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi) const {
     return meetingIn<T0_ONLY>(D(), lo, hi, GROUP, *this);
   }
 
@@ -194,16 +140,16 @@ class GroupLanes {  // in up to 16 of the 32 registers
   hn::Vec<D> vectors_[RECORD];
 };
 #else
-template <bool T0_ONLY, class Lanes>
+template <bool T0_ONLY>
 class GroupLanes {
  public:
-  HWY_INLINE GroupLanes(const int16_t* HWY_RESTRICT group, Lanes) : group_(group) {}
-  HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
+  HWY_INLINE explicit GroupLanes(const uint16_t* HWY_RESTRICT group) : group_(group) {}
+  HWY_INLINE uint32_t meets(const uint16_t* HWY_RESTRICT lo, const uint16_t* HWY_RESTRICT hi) const {
     return meeting<T0_ONLY>(lo, hi, GROUP, group_);
   }
 
  private:
-  const int16_t* HWY_RESTRICT group_;
+  const uint16_t* HWY_RESTRICT group_;
 };
 #endif
 

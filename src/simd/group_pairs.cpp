@@ -20,14 +20,13 @@ namespace hn = hwy::HWY_NAMESPACE;
 class PairWriter {
  public:
   // Lanes of the group are numbered from `base`.
-  template <class Lanes>
-  HWY_INLINE PairWriter(const Lanes& lanes, bool node_first, uint32_t base);
+  HWY_INLINE PairWriter(bool node_first, uint32_t base);
   // Of the lanes in a mask; returns where the next pair goes. There is room for all lanes from o on.
   HWY_INLINE uint32_t* write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const;
 
  private:
 #if DCCD_AVX512
-  using D = AllLanes::D;
+  using D = Lanes32;
   hn::Vec<D> lanes_;        // their numbers
   hn::Mask<D> node_slots_;  // of the numbers of eight pairs, those of nodes
 #else
@@ -37,10 +36,8 @@ class PairWriter {
 };
 
 #if DCCD_AVX512
-template <class Lanes>
-PairWriter::PairWriter(const Lanes& lanes, bool node_first, uint32_t base)
-    : lanes_(lanes.together(hn::Add(hn::Load(D(), LANES), hn::Set(D(), base)))),
-      node_slots_(maskOf(node_first ? 0x5555 : 0xaaaa)) {}
+PairWriter::PairWriter(bool node_first, uint32_t base)
+    : lanes_(hn::Add(hn::Load(D(), LANES), hn::Set(D(), base))), node_slots_(maskOf(node_first ? 0x5555 : 0xaaaa)) {}
 
 // Hardly a node meets more than eight lanes. Below that there is no branch on their number, which nothing foretells: a
 // whole vector is stored, and o moves on by what counts.
@@ -58,8 +55,7 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
   return o + 2 * count;
 }
 #else
-template <class Lanes>
-PairWriter::PairWriter(const Lanes&, bool node_first, uint32_t base) : node_first_(node_first), base_(base) {}
+PairWriter::PairWriter(bool node_first, uint32_t base) : node_first_(node_first), base_(base) {}
 
 uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const {
   for (; mask; mask &= mask - 1) {
@@ -80,18 +76,17 @@ struct LeaveNoneOut {
 };
 
 // Features of A and B vertices that share one: their vertices lane by lane.
-template <size_t A, size_t B, class Lanes>
+template <size_t A, size_t B>
 class LeaveAdjacentOut {
  public:
   static constexpr bool FIRST = false;
   // by_rows: node i is in the first group.
-  HWY_INLINE LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, bool by_rows,
-                              const Lanes& lanes);
+  HWY_INLINE LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, bool by_rows);
   HWY_INLINE uint32_t from(uint32_t i, uint32_t mask) const;
 
  private:
 #if DCCD_AVX512
-  using D = typename Lanes::D;
+  using D = Lanes32;
   // Of the k-th pair of a vertex of a and one of b, which are compared.
   const uint32_t* HWY_RESTRICT of_nodes_[A * B];
   hn::Vec<D> of_lanes_[A * B];
@@ -103,33 +98,31 @@ class LeaveAdjacentOut {
 };
 
 #if DCCD_AVX512
-template <size_t A, size_t B, class Lanes>
-LeaveAdjacentOut<A, B, Lanes>::LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b,
-                                                bool by_rows, const Lanes& lanes) {
+template <size_t A, size_t B>
+LeaveAdjacentOut<A, B>::LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, bool by_rows) {
   const uint32_t *HWY_RESTRICT nodes = by_rows ? a : b, *HWY_RESTRICT opposite = by_rows ? b : a;
   for (size_t k = 0; k < A * B; ++k) {
     // Groups that are alike change places without a difference: a vertex of a node then is loaded once for all lanes'.
     const bool node_first = A == B || by_rows;
     of_nodes_[k] = nodes + (node_first ? k / B : k % B) * GROUP;
-    of_lanes_[k] = lanes(hn::Load(AllLanes::D(), opposite + (node_first ? k % B : k / B) * GROUP));
+    of_lanes_[k] = hn::Load(D(), opposite + (node_first ? k % B : k / B) * GROUP);
   }
 }
 
-template <size_t A, size_t B, class Lanes>
-uint32_t LeaveAdjacentOut<A, B, Lanes>::from(uint32_t i, uint32_t mask) const {
+template <size_t A, size_t B>
+uint32_t LeaveAdjacentOut<A, B>::from(uint32_t i, uint32_t mask) const {
   const D d;
   auto same = hn::Eq(hn::Set(d, of_nodes_[0][i]), of_lanes_[0]);
   for (size_t k = 1; k < A * B; ++k) same = hn::Or(same, hn::Eq(hn::Set(d, of_nodes_[k][i]), of_lanes_[k]));
   return mask & ~bitsOf(d, same);
 }
 #else
-template <size_t A, size_t B, class Lanes>
-LeaveAdjacentOut<A, B, Lanes>::LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b,
-                                                bool by_rows, const Lanes&)
+template <size_t A, size_t B>
+LeaveAdjacentOut<A, B>::LeaveAdjacentOut(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, bool by_rows)
     : a_(a), b_(b), by_rows_(by_rows) {}
 
-template <size_t A, size_t B, class Lanes>
-uint32_t LeaveAdjacentOut<A, B, Lanes>::from(uint32_t i, uint32_t mask) const {
+template <size_t A, size_t B>
+uint32_t LeaveAdjacentOut<A, B>::from(uint32_t i, uint32_t mask) const {
   return mask & ~(by_rows_ ? sharing<A, B>(a_, i, b_) : sharing<B, A>(b_, i, a_));
 }
 #endif
@@ -157,19 +150,15 @@ HWY_INLINE const LanePairs& pairsOf(const KnownPairs& known, uint32_t g, uint32_
 // first of them comes before that.
 struct NoneOf {
   HWY_INLINE void next(uint32_t, uint32_t) {}
-  template <class Lanes>
-  HWY_INLINE LeaveNoneOut of(uint32_t, uint32_t, bool, const Lanes&) const {
-    return {};
-  }
+  HWY_INLINE LeaveNoneOut of(uint32_t, uint32_t, bool) const { return {}; }
 };
 
 template <size_t A, size_t B>
 struct AdjacentOf {
   const GroupsView &a, &b;
   HWY_INLINE void next(uint32_t, uint32_t) {}
-  template <class Lanes>
-  HWY_INLINE LeaveAdjacentOut<A, B, Lanes> of(uint32_t g, uint32_t h, bool by_rows, const Lanes& lanes) const {
-    return {a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows, lanes};
+  HWY_INLINE LeaveAdjacentOut<A, B> of(uint32_t g, uint32_t h, bool by_rows) const {
+    return {a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows};
   }
 };
 
@@ -182,9 +171,7 @@ struct KnownOf {
     soon = &pairsOf(known, g, h);
     hwy::Prefetch(soon);
   }
-  HWY_INLINE LeaveKnownOut of(uint32_t, uint32_t, bool by_rows, const AllLanes&) const {
-    return {by_rows ? now->rows : now->columns};
-  }
+  HWY_INLINE LeaveKnownOut of(uint32_t, uint32_t, bool by_rows) const { return {by_rows ? now->rows : now->columns}; }
 };
 
 // Whether a node meets anything is unpredictable. Where a test costs no more than a mispredicted branch, all nodes are
@@ -193,25 +180,25 @@ constexpr bool WRITES_LATER = DCCD_AVX512;
 
 // A pair of groups, g and h: nodes of one are compared with lanes of the other, by rows those of g with h's.
 struct NodesAndLanes {
-  const int16_t *HWY_RESTRICT soa_of_nodes, *HWY_RESTRICT soa_of_lanes;
+  const uint16_t *HWY_RESTRICT soa_of_nodes, *HWY_RESTRICT soa_of_lanes;
   uint32_t nodes, lanes;  // masks: which may meet something
   uint32_t g, h;
   bool by_rows;
 };
 
 // The surviving pairs of nodes and lanes, less what is left out: to o, which is returned moved on.
-template <bool T0_ONLY, class Lanes, class LeaveOutOf>
-HWY_INLINE uint32_t* testNodes(const NodesAndLanes& pair, const Lanes& lanes, uint32_t mask_of_lanes, bool same,
-                               Diagonal diagonal, const LeaveOutOf& left_out, uint32_t* HWY_RESTRICT o) {
-  const GroupLanes<T0_ONLY, Lanes> group(pair.soa_of_lanes, lanes);
-  const PairWriter writer(lanes, pair.by_rows, (pair.by_rows ? pair.h : pair.g) * GROUP);
+template <bool T0_ONLY, class LeaveOutOf>
+HWY_INLINE uint32_t* testNodes(const NodesAndLanes& pair, bool same, Diagonal diagonal, const LeaveOutOf& left_out,
+                               uint32_t* HWY_RESTRICT o) {
+  const GroupLanes<T0_ONLY> group(pair.soa_of_lanes);
+  const PairWriter writer(pair.by_rows, (pair.by_rows ? pair.h : pair.g) * GROUP);
   const uint32_t base = (pair.by_rows ? pair.g : pair.h) * GROUP;
-  const auto leave_out = left_out.of(pair.g, pair.h, pair.by_rows, lanes);
+  const auto leave_out = left_out.of(pair.g, pair.h, pair.by_rows);
   constexpr bool LEAVES_OUT_FIRST = decltype(leave_out)::FIRST;
   uint32_t met[GROUP], to_write = 0;
   for (uint32_t left = pair.nodes; left; left &= left - 1) {
     const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
-    uint32_t mask = mask_of_lanes;
+    uint32_t mask = pair.lanes;
     // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
@@ -236,10 +223,10 @@ HWY_INLINE uint32_t* testNodes(const NodesAndLanes& pair, const Lanes& lanes, ui
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
                               Diagonal diagonal, const LeaveOutOf& left_out, uint32_t* HWY_RESTRICT o) {
-  const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
-  const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
-  const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
-  const int16_t* HWY_RESTRICT bound_b = b.aos + size_t{h} * AOS_SIZE;
+  const uint16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
+  const uint16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
+  const uint16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
+  const uint16_t* HWY_RESTRICT bound_b = b.aos + size_t{h} * AOS_SIZE;
   uint32_t rows = same ? 0xffffu : meeting<T0_ONLY>(bound_b, bound_b + RECORD, 1, sa);
   if (rows == 0) return o;
   uint32_t cols = same ? 0xffffu : meeting<T0_ONLY>(bound_a, bound_a + RECORD, 1, sb);
@@ -248,20 +235,12 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
   const NodesAndLanes pair = {
       by_rows ? sa : sb, by_rows ? sb : sa, by_rows ? rows : cols, by_rows ? cols : rows, g, h, by_rows};
-#if DCCD_AVX512
-  if constexpr (!T0_ONLY) {
-    const auto few = static_cast<uint32_t>(hwy::PopCount(pair.lanes));
-    if (few <= GROUP / 2) {
-      return testNodes<T0_ONLY>(pair, FewLanes(pair.lanes), (1u << few) - 1, false, diagonal, left_out, o);
-    }
-  }
-#endif
-  return testNodes<T0_ONLY>(pair, AllLanes(), pair.lanes, same, diagonal, left_out, o);
+  return testNodes<T0_ONLY>(pair, same, diagonal, left_out, o);
 }
 
 template <bool T0_ONLY>
 HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
-  const int16_t* next = view.soa + size_t{group} * SOA_SIZE;
+  const uint16_t* next = view.soa + size_t{group} * SOA_SIZE;
   for (size_t line = 0; line < SOA_SIZE; line += 32) {
     if (!T0_ONLY || line % (RECORD * GROUP) < SOA_T1) hwy::Prefetch(next + line);
   }

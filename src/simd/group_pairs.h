@@ -8,8 +8,8 @@ namespace simd {
 
 /// One level of a tree for testGroupPairs.
 struct GroupsView {
-  const std::int16_t* soa;
-  const std::int16_t* aos;
+  const std::uint16_t* soa;
+  const std::uint16_t* aos;
   const std::uint32_t* vertices = nullptr;  ///< of leaves: lane j's k-th at [(group * arity + k) * GROUP + j], aligned
   std::size_t arity = 0;
 };

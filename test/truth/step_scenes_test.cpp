@@ -274,10 +274,10 @@ void expectLinearKeepsAll(const PairList& truth, const std::string& what) {
   std::fill_n(high, 8, -HUGE_VAL);
   simd::projectionBounds(truth.vertices[0].t0, truth.vertices.size(), low, high);
   for (int d = 0; d < 8; ++d) scale[d] = high[d] > low[d] ? simd::RECORD_RANGE / (high[d] - low[d]) : 0;
-  std::vector<std::int16_t> records(truth.vertices.size() * simd::RECORD);
+  std::vector<std::uint16_t> records(truth.vertices.size() * simd::RECORD);
   simd::quantize(truth.vertices[0].t0, truth.vertices.size(), low, scale, records.data());
-  auto soa = hwy::AllocateAligned<std::int16_t>(2 * simd::SOA_SIZE);
-  auto aos = hwy::AllocateAligned<std::int16_t>(2 * simd::AOS_SIZE);
+  auto soa = hwy::AllocateAligned<std::uint16_t>(2 * simd::SOA_SIZE);
+  auto aos = hwy::AllocateAligned<std::uint16_t>(2 * simd::AOS_SIZE);
   const std::size_t first = truth.kind == PairKind::VERTEX_FACE ? 1 : 2;
   for (const Quad& quad : truth.pairs) {
     for (std::size_t side = 0; side < 2; ++side) {

@@ -24,16 +24,16 @@ int sideOf(const double* p, const double* q, const double* point) {
 /// Calls visit(slot) for the features whose bounds at `at` the half-line from the record along +z meets. Bounds hold
 /// their features, and records keep the order of coordinates, so no feature that the half-line meets is missed.
 template <class Visit>
-void visitAbove(const ClusterTree& tree, const std::int16_t* record, int at, std::size_t level, std::size_t group,
+void visitAbove(const ClusterTree& tree, const std::uint16_t* record, int at, std::size_t level, std::size_t group,
                 const Visit& visit) {
   if (level == 0) tree.needLeaves(group);
-  const std::int16_t* from = record + at * simd::DIRECTIONS;
-  const std::int16_t* low =
+  const std::uint16_t* from = record + at * simd::DIRECTIONS;
+  const std::uint16_t* low =
       tree.level(level).soa.data() + group * simd::SOA_SIZE + simd::soaIndex(at * simd::DIRECTIONS, 0);
-  const std::int16_t* high = low + simd::SOA_SIZE / 2;
+  const std::uint16_t* high = low + simd::SOA_SIZE / 2;
   for (std::size_t lane = 0; lane < simd::GROUP; ++lane) {
     const auto lowest = [&](std::size_t axis) { return low[simd::soaIndex(axis, lane)]; };
-    const auto highest = [&](std::size_t axis) { return high[simd::soaIndex(axis, lane)]; };
+    const auto highest = [&](std::size_t axis) { return simd::turned(high[simd::soaIndex(axis, lane)]); };
     if (lowest(0) > from[0] || highest(0) < from[0] || lowest(1) > from[1] || highest(1) < from[1]) continue;
     if (highest(2) < from[2]) continue;
     const std::size_t node = group * simd::GROUP + lane;

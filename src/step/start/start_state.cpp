@@ -292,12 +292,15 @@ void StartStateSearch::viewFaces(const ClusterTree& faces, const Parallel& paral
 /// From next_unit_ on.
 void StartStateSearch::setUnits(std::size_t fans) {
   fans_ = static_cast<std::uint32_t>(fans);
-  by_group_.clear();
+  keys_.clear();
   for (std::size_t p = 0; p < groups_.size(); p += 2) {
-    if (fans_ + groups_[p] >= next_unit_) by_group_.push_back({groups_[p], groups_[p + 1]});
+    if (fans_ + groups_[p] >= next_unit_) keys_.push_back(std::uint64_t{groups_[p]} << 32 | groups_[p + 1]);
   }
-  const auto key = [](const std::array<std::uint32_t, 2>& pair) { return std::uint64_t{pair[0]} << 32 | pair[1]; };
-  std::sort(by_group_.begin(), by_group_.end(), [&](const auto& x, const auto& y) { return key(x) < key(y); });
+  radixSort(keys_, other_keys_);
+  by_group_.clear();
+  for (const std::uint64_t key : keys_) {
+    by_group_.push_back({static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)});
+  }
   unit_number_.clear();
   unit_begin_.clear();
   for (std::uint32_t fan = next_unit_; fan < fans_; ++fan) {

@@ -82,22 +82,22 @@ TEST(ClusterTree, HasLevelsForItsFeatures) {
 }
 
 /// Bounds of a level's group straight from the features below it.
-void expectBounds(const SceneArrays& scene, const ClusterTree& tree, const std::vector<std::int16_t>& records) {
+void expectBounds(const SceneArrays& scene, const ClusterTree& tree, const std::vector<std::uint16_t>& records) {
   std::size_t span = simd::GROUP;
   for (std::size_t l = 0; l < tree.height(); ++l, span *= simd::GROUP) {
     for (std::size_t g = 0; g < tree.level(l).groups; ++g) {
       for (std::size_t k = 0; k < simd::RECORD; ++k) {
-        std::int16_t lo = simd::EMPTY_LO, hi = simd::EMPTY_HI;
+        std::uint16_t lo = simd::EMPTY, hi = simd::turned(simd::EMPTY);
         for (std::size_t f = g * span; f < std::min((g + 1) * span, tree.featureCount()); ++f) {
           for (std::size_t i = 0; i < tree.arity(); ++i) {
-            const std::int16_t value = records[tree.feature(f)[i] * simd::RECORD + k];
+            const std::uint16_t value = records[tree.feature(f)[i] * simd::RECORD + k];
             lo = std::min(lo, value);
             hi = std::max(hi, value);
           }
         }
-        const std::int16_t* aos = tree.level(l).aos.data() + g * simd::AOS_SIZE;
+        const std::uint16_t* aos = tree.level(l).aos.data() + g * simd::AOS_SIZE;
         ASSERT_EQ(aos[k], lo) << "level " << l << ", group " << g << " of " << scene.vertexCount() << " vertices";
-        ASSERT_EQ(aos[simd::RECORD + k], hi) << "level " << l << ", group " << g;
+        ASSERT_EQ(aos[simd::RECORD + k], simd::turned(hi)) << "level " << l << ", group " << g;
       }
     }
   }
@@ -122,7 +122,7 @@ TEST(ClusterTree, EveryLevelBoundsWhatIsBelow) {
   std::fill_n(high, 8, -HUGE_VAL);
   simd::projectionBounds(scene.vertices()->t0, scene.vertexCount(), low, high);
   for (int d = 0; d < 8; ++d) scale[d] = std::min(simd::RECORD_RANGE / 2 / (high[d] / 2 - low[d] / 2), 1e300);
-  std::vector<std::int16_t> records(scene.vertexCount() * simd::RECORD);
+  std::vector<std::uint16_t> records(scene.vertexCount() * simd::RECORD);
   simd::quantize(scene.vertices()->t0, scene.vertexCount(), low, scale, records.data());
   for (const ClusterTree& tree : scene.bodies()[0].trees) expectBounds(scene, tree, records);
 }
@@ -130,10 +130,10 @@ TEST(ClusterTree, EveryLevelBoundsWhatIsBelow) {
 TEST(ClusterTree, LeavesThatWaitAreMadeWhenTheyAreNeeded) {
   std::vector<Index> features;
   for (Index i = 0; i + 1 < 600; ++i) features.insert(features.end(), {i, i + 1});
-  std::vector<std::int16_t> records[2];
+  std::vector<std::uint16_t> records[2];
   for (std::size_t i = 0; i < 600 * simd::RECORD; ++i) {
-    records[0].push_back(static_cast<std::int16_t>(i % 1009));
-    records[1].push_back(static_cast<std::int16_t>(i % 2003));
+    records[0].push_back(static_cast<std::uint16_t>(i % 1009));
+    records[1].push_back(static_cast<std::uint16_t>(i % 2003));
   }
   ClusterTree tree, before, after;
   for (ClusterTree* t : {&tree, &before, &after}) {
@@ -152,7 +152,7 @@ TEST(ClusterTree, LeavesThatWaitAreMadeWhenTheyAreNeeded) {
     EXPECT_TRUE(std::equal(expected.soa.data(), expected.soa.data() + level.groups * simd::SOA_SIZE, level.soa.data()));
   }
   const auto isThatOf = [&](const ClusterTree& other, std::size_t group) {
-    const std::int16_t* soa = tree.level(0).soa.data() + group * simd::SOA_SIZE;
+    const std::uint16_t* soa = tree.level(0).soa.data() + group * simd::SOA_SIZE;
     return std::equal(soa, soa + simd::SOA_SIZE, other.level(0).soa.data() + group * simd::SOA_SIZE);
   };
   tree.needLeaves(7);
@@ -181,12 +181,12 @@ TEST(ClusterTree, MaskedFeaturesAreEmptyAndComeBack) {
   std::vector<Index> features;
   for (Index i = 0; i + 1 < 40; ++i) features.insert(features.end(), {i, i + 1});
   tree.build(features, 2);
-  std::vector<std::int16_t> records(40 * simd::RECORD, 5);
+  std::vector<std::uint16_t> records(40 * simd::RECORD, 5);
   std::vector<std::uint8_t> active(40, 1);
   active[20] = 0;
   const auto isEmpty = [&](std::size_t slot) {
-    const std::int16_t* soa = tree.level(0).soa.data() + slot / simd::GROUP * simd::SOA_SIZE;
-    return soa[simd::soaIndex(0, slot % simd::GROUP)] == simd::EMPTY_LO;
+    const std::uint16_t* soa = tree.level(0).soa.data() + slot / simd::GROUP * simd::SOA_SIZE;
+    return soa[simd::soaIndex(0, slot % simd::GROUP)] == simd::EMPTY;
   };
   tree.mask(active.data());
   tree.refitLeaves(records.data(), nullptr, 0, tree.level(0).groups);

@@ -150,7 +150,7 @@ TEST(SceneRecords, ABodyWithoutAnythingActiveSpansNothing) {
   scene.record(truth.step(), stats, Shuffled{3});
   expectTruth(truth, scene, stats, 0);
   scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
-  std::int16_t lowest = 0, highest = 0;
+  std::uint16_t lowest = simd::EMPTY, highest = 0;
   for (const Index internal : {scene.bodies()[0].internal_begin, scene.bodies()[1].internal_begin}) {
     for (Index i = 0; i < 20; ++i) {
       lowest = std::min(lowest, scene.record(internal + i)[0]);

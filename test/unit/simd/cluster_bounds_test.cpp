@@ -20,11 +20,11 @@ TEST(ClusterBounds, LeavesHoldTheBoundsOfTheirVertices) {
     for (std::size_t arity = 1; arity <= 3; ++arity) {
       for (const bool with_margin : {false, true}) {
         const std::size_t vertices = 40, groups = 3;
-        std::vector<std::int16_t> records(vertices * RECORD);
+        std::vector<std::uint16_t> records(vertices * RECORD);
         for (auto& r : records) r = anyRecordValue(random, 32764);
-        std::int16_t margin[RECORD];
+        std::uint16_t margin[RECORD];
         for (auto& m : margin) {
-          m = static_cast<std::int16_t>(random() % 3 == 0 ? 32766 + random() % 2 : random() % 1000);
+          m = static_cast<std::uint16_t>(random() % 3 == 0 ? 32766 + random() % 2 : random() % 1000);
         }
         std::vector<std::uint32_t> indices(groups * GROUP * arity);
         for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint32_t>(random() % vertices);
@@ -34,29 +34,29 @@ TEST(ClusterBounds, LeavesHoldTheBoundsOfTheirVertices) {
         for (std::size_t lane = 0; lane < groups * GROUP; ++lane) {
           Node n = emptyNode();
           for (std::size_t k = 0; k < RECORD && indices[lane * arity] != UINT32_MAX; ++k) {
-            int lo = 40000, hi = -40000;
+            int lo = 70000, hi = -1;
             for (std::size_t j = 0; j < arity; ++j) {
               lo = std::min<int>(lo, records[indices[lane * arity + j] * RECORD + k]);
               hi = std::max<int>(hi, records[indices[lane * arity + j] * RECORD + k]);
             }
             if (with_margin) {
-              lo = margin[k] == simd::UNBOUNDED ? -32766 : std::max(lo - margin[k], -32766);
-              hi = margin[k] == simd::UNBOUNDED ? 32766 : std::min(hi + margin[k], 32766);
+              lo = margin[k] == simd::UNBOUNDED ? MIDDLE - 32766 : std::max(lo - margin[k], MIDDLE - 32766);
+              hi = margin[k] == simd::UNBOUNDED ? MIDDLE + 32766 : std::min(hi + margin[k], MIDDLE + 32766);
             }
-            n.lo[k] = static_cast<std::int16_t>(lo);
-            n.hi[k] = static_cast<std::int16_t>(hi);
+            n.lo[k] = static_cast<std::uint16_t>(lo);
+            n.hi[k] = static_cast<std::uint16_t>(hi);
           }
           expected.nodes.push_back(n);
         }
         expected.pack();
-        auto soa = hwy::AllocateAligned<std::int16_t>(groups * SOA_SIZE);
-        auto aos = hwy::AllocateAligned<std::int16_t>(groups * AOS_SIZE);
+        auto soa = hwy::AllocateAligned<std::uint16_t>(groups * SOA_SIZE);
+        auto aos = hwy::AllocateAligned<std::uint16_t>(groups * AOS_SIZE);
         simd::buildLeaves(records.data(), indices.data(), arity, groups * GROUP, with_margin ? margin : nullptr,
                           soa.get(), aos.get());
         EXPECT_TRUE(std::equal(soa.get(), soa.get() + groups * SOA_SIZE, expected.soa.get())) << target << arity;
         EXPECT_TRUE(std::equal(aos.get(), aos.get() + groups * AOS_SIZE, expected.aos.get())) << target << arity;
         if (with_margin) continue;
-        std::fill_n(aos.get(), groups * AOS_SIZE, std::int16_t{0});
+        std::fill_n(aos.get(), groups * AOS_SIZE, std::uint16_t{0});
         simd::boundGroups(records.data(), indices.data(), arity, groups * GROUP, aos.get());
         EXPECT_TRUE(std::equal(aos.get(), aos.get() + groups * AOS_SIZE, expected.aos.get())) << target << arity;
       }
@@ -74,13 +74,14 @@ TEST(ClusterBounds, UpperGroupsHoldTheBoundsOfTheirChildren) {
         Node n = emptyNode();
         if (c < children) {
           std::copy_n(below.aos.get() + c * AOS_SIZE, RECORD, n.lo.begin());
-          std::copy_n(below.aos.get() + c * AOS_SIZE + RECORD, RECORD, n.hi.begin());
+          std::transform(below.aos.get() + c * AOS_SIZE + RECORD, below.aos.get() + (c + 1) * AOS_SIZE, n.hi.begin(),
+                         simd::turned);
         }
         expected.nodes.push_back(n);
       }
       expected.pack();
-      auto soa = hwy::AllocateAligned<std::int16_t>(expected.count * SOA_SIZE);
-      auto aos = hwy::AllocateAligned<std::int16_t>(expected.count * AOS_SIZE);
+      auto soa = hwy::AllocateAligned<std::uint16_t>(expected.count * SOA_SIZE);
+      auto aos = hwy::AllocateAligned<std::uint16_t>(expected.count * AOS_SIZE);
       simd::buildUpper(below.aos.get(), children, soa.get(), aos.get());
       EXPECT_TRUE(std::equal(soa.get(), soa.get() + expected.count * SOA_SIZE, expected.soa.get()))
           << target << children;
@@ -93,18 +94,18 @@ TEST(ClusterBounds, UpperGroupsHoldTheBoundsOfTheirChildren) {
 // A margin that reaches the ends of the range must not make a feature look empty, or two overlapping ones apart.
 TEST(ClusterBounds, WidenedNodesStillMeetWhatTheyTouch) {
   forEachSimdTarget([](const std::string& target) {
-    std::vector<std::int16_t> records(2 * RECORD, 32764);
-    std::fill_n(records.begin(), RECORD, static_cast<std::int16_t>(-32764));
+    std::vector<std::uint16_t> records(2 * RECORD, MIDDLE + 32764);
+    std::fill_n(records.begin(), RECORD, static_cast<std::uint16_t>(MIDDLE - 32764));
     std::vector<std::uint32_t> indices(GROUP, UINT32_MAX);
     indices[0] = 0;
     indices[1] = 1;
     const auto widened = [&](int m) {
-      std::int16_t margin[RECORD];
-      std::fill_n(margin, RECORD, static_cast<std::int16_t>(m));
+      std::uint16_t margin[RECORD];
+      std::fill_n(margin, RECORD, static_cast<std::uint16_t>(m));
       Groups groups;
       groups.count = 1;
-      groups.soa = hwy::AllocateAligned<std::int16_t>(SOA_SIZE);
-      groups.aos = hwy::AllocateAligned<std::int16_t>(AOS_SIZE);
+      groups.soa = hwy::AllocateAligned<std::uint16_t>(SOA_SIZE);
+      groups.aos = hwy::AllocateAligned<std::uint16_t>(AOS_SIZE);
       simd::buildLeaves(records.data(), indices.data(), 1, GROUP, margin, groups.soa.get(), groups.aos.get());
       return groups;
     };

@@ -14,10 +14,11 @@ namespace test {
 namespace {
 
 using simd::RECORD;
+constexpr int LOWEST = 3, HIGHEST = 65531;  // of all records
 
 struct Records {
   double low[8], scale[8];
-  std::vector<std::int16_t> values;
+  std::vector<std::uint16_t> values;
 };
 
 /// As the scene does it: bounds, scale, records.
@@ -66,11 +67,11 @@ void expectMonotone(const std::vector<VertexMotion>& vertices, const std::string
   const auto point = [&](std::size_t i) { return i % 2 ? vertices[i / 2].t1 : vertices[i / 2].t0; };
   for (std::size_t i = 0; i < 2 * vertices.size(); ++i) {
     for (std::size_t k = 0; k < 8; ++k) {
-      const std::int16_t q = r.values[8 * i + k];
-      ASSERT_GE(q, -32764) << what;
-      ASSERT_LE(q, 32764) << what;
+      const int q = r.values[8 * i + k];
+      ASSERT_GE(q, LOWEST) << what;
+      ASSERT_LE(q, HIGHEST) << what;
       for (std::size_t j = 0; j < i; ++j) {
-        const std::int16_t other = r.values[8 * j + k];
+        const int other = r.values[8 * j + k];
         const int order = compareExactly(point(i), point(j), static_cast<int>(k));
         ASSERT_FALSE((q > other && order <= 0) || (q < other && order >= 0))
             << what << ": record values " << q << " and " << other << " of projections in another order (" << order
@@ -126,13 +127,13 @@ TEST(ClusterRecords, RecordsUseTheirRange) {
   forEachSimdTarget([&](const std::string& target) {
     const Records r = quantized(vertices);
     for (std::size_t k = 0; k < 8; ++k) {
-      int lo = 32767, hi = -32767;
+      int lo = HIGHEST, hi = LOWEST;
       for (std::size_t i = k; i < r.values.size(); i += 8) {
         lo = std::min<int>(lo, r.values[i]);
         hi = std::max<int>(hi, r.values[i]);
       }
-      EXPECT_EQ(lo, -32764) << target;
-      EXPECT_GE(hi, 32763) << target;
+      EXPECT_EQ(lo, LOWEST) << target;
+      EXPECT_GE(hi, HIGHEST - 1) << target;
     }
   });
 }
@@ -146,11 +147,11 @@ TEST(ClusterRecords, WhatLiesOutsideTheRangeTakesItsEnd) {
   std::fill_n(scale, 8, simd::RECORD_RANGE);
   forEachSimdTarget([&](const std::string& target) {
     for (const double* vertex : {far, near}) {
-      std::int16_t records[RECORD];
+      std::uint16_t records[RECORD];
       simd::quantize(vertex, 1, low, scale, records);
       for (std::size_t d = 0; d < 3; ++d) {
-        EXPECT_EQ(records[d], -32764) << target;
-        EXPECT_EQ(records[8 + d], 32764) << target;
+        EXPECT_EQ(records[d], LOWEST) << target;
+        EXPECT_EQ(records[8 + d], HIGHEST) << target;
       }
     }
   });
@@ -158,16 +159,17 @@ TEST(ClusterRecords, WhatLiesOutsideTheRangeTakesItsEnd) {
 
 /// A group of leaves, each a vertex of its own.
 struct VertexLeaves {
-  hwy::AlignedFreeUniquePtr<std::int16_t[]> soa = hwy::AllocateAligned<std::int16_t>(simd::SOA_SIZE),
-                                            aos = hwy::AllocateAligned<std::int16_t>(simd::AOS_SIZE);
-  explicit VertexLeaves(const std::vector<std::int16_t>& records) {
+  hwy::AlignedFreeUniquePtr<std::uint16_t[]> soa = hwy::AllocateAligned<std::uint16_t>(simd::SOA_SIZE),
+                                             aos = hwy::AllocateAligned<std::uint16_t>(simd::AOS_SIZE);
+  explicit VertexLeaves(const std::vector<std::uint16_t>& records) {
     std::vector<std::uint32_t> lanes(simd::GROUP, UINT32_MAX);
     for (std::uint32_t i = 0; i < records.size() / RECORD && i < simd::GROUP; ++i) lanes[i] = i;
     simd::buildLeaves(records.data(), lanes.data(), 1, simd::GROUP, nullptr, soa.get(), aos.get());
   }
   /// The values at the second end: lowest or highest.
   int at1(std::size_t direction, std::size_t lane, bool highest) const {
-    return soa[(highest ? simd::SOA_SIZE / 2 : 0) + simd::SOA_T1 + simd::soaIndex(direction, lane)];
+    const std::uint16_t* values = soa.get() + simd::SOA_T1 + simd::soaIndex(direction, lane);
+    return highest ? simd::turned(values[simd::SOA_SIZE / 2]) : values[0];
   }
 };
 
@@ -201,7 +203,7 @@ TEST(ShortenedBounds, OrderOfBoundsIsOrderOfVertices) {
       VertexLeaves leaves(r.values);
       simd::shortenBounds(leaves.soa.get(), leaves.aos.get(), 1, end, swept);
       for (std::size_t d = 0; d < 8; ++d) {
-        int lowest = 32767, highest = -32767;
+        int lowest = simd::EMPTY, highest = 0;
         for (std::size_t i = 0; i < simd::GROUP; ++i) {
           lowest = std::min(lowest, leaves.at1(d, i, false));
           highest = std::max(highest, leaves.at1(d, i, true));
@@ -219,7 +221,7 @@ TEST(ShortenedBounds, OrderOfBoundsIsOrderOfVertices) {
           }
         }
         ASSERT_LE(leaves.aos[8 + d], lowest) << "the group's bounds hold those of its members";
-        ASSERT_GE(leaves.aos[RECORD + 8 + d], highest);
+        ASSERT_GE(simd::turned(leaves.aos[RECORD + 8 + d]), highest);
       }
     }
   });
@@ -252,9 +254,9 @@ TEST(ShortenedBounds, TheUnitThatTheyAreWidenedByHoldsTheRounding) {
     ++tried;
     const Records r = quantized({rest, moving, low, high});
     ASSERT_EQ(r.scale[0], scale);
-    ASSERT_EQ(r.values[0], k - 32764);
-    ASSERT_EQ(r.values[RECORD], 0 - 32764);
-    ASSERT_EQ(r.values[RECORD + 8], last - 32764);
+    ASSERT_EQ(r.values[0], k + LOWEST);
+    ASSERT_EQ(r.values[RECORD], 0 + LOWEST);
+    ASSERT_EQ(r.values[RECORD + 8], last + LOWEST);
     forEachSimdTarget([&](const std::string& target) {
       for (const bool swept : {false, true}) {
         VertexLeaves leaves(r.values);

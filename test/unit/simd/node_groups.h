@@ -16,26 +16,27 @@ namespace dccd {
 namespace test {
 
 using simd::AOS_SIZE;
-using simd::EMPTY_HI;
-using simd::EMPTY_LO;
+using simd::EMPTY;
 using simd::GROUP;
 using simd::RECORD;
 using simd::SOA_SIZE;
 using Random = std::mt19937_64;
 
-inline std::int16_t anyRecordValue(Random& random, int range) {
-  return static_cast<std::int16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * range + 1)) - range);
+constexpr int MIDDLE = 32767;  ///< of the records' range
+
+inline std::uint16_t anyRecordValue(Random& random, int range) {
+  return static_cast<std::uint16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * range + 1)) + MIDDLE - range);
 }
 
-/// Bounds of one node: lo and hi of the 16 record values.
+/// Bounds of one node: lo and hi of the 16 record values. Groups hold the latter turned.
 struct Node {
-  std::array<std::int16_t, RECORD> lo, hi;
+  std::array<std::uint16_t, RECORD> lo, hi;
 };
 
 inline Node emptyNode() {
   Node n;
-  n.lo.fill(EMPTY_LO);
-  n.hi.fill(EMPTY_HI);
+  n.lo.fill(EMPTY);
+  n.hi.fill(simd::turned(EMPTY));
   return n;
 }
 
@@ -43,25 +44,25 @@ inline Node emptyNode() {
 struct Groups {
   std::size_t count = 0;
   std::vector<Node> nodes;  // 16 a group
-  hwy::AlignedFreeUniquePtr<std::int16_t[]> soa, aos;
+  hwy::AlignedFreeUniquePtr<std::uint16_t[]> soa, aos;
 
   simd::GroupsView view() const { return {soa.get(), aos.get()}; }
   void pack() {
     count = nodes.size() / GROUP;
-    soa = hwy::AllocateAligned<std::int16_t>(count * SOA_SIZE);
-    aos = hwy::AllocateAligned<std::int16_t>(count * AOS_SIZE);
+    soa = hwy::AllocateAligned<std::uint16_t>(count * SOA_SIZE);
+    aos = hwy::AllocateAligned<std::uint16_t>(count * AOS_SIZE);
     for (std::size_t g = 0; g < count; ++g) {
       for (std::size_t k = 0; k < RECORD; ++k) {
-        std::int16_t lo = EMPTY_LO, hi = EMPTY_HI;
+        std::uint16_t lo = EMPTY, hi = simd::turned(EMPTY);
         for (std::size_t i = 0; i < GROUP; ++i) {
           const Node& n = nodes[g * GROUP + i];
           soa[g * SOA_SIZE + simd::soaIndex(k, i)] = n.lo[k];
-          soa[g * SOA_SIZE + RECORD * GROUP + simd::soaIndex(k, i)] = n.hi[k];
+          soa[g * SOA_SIZE + RECORD * GROUP + simd::soaIndex(k, i)] = simd::turned(n.hi[k]);
           lo = std::min(lo, n.lo[k]);
           hi = std::max(hi, n.hi[k]);
         }
         aos[g * AOS_SIZE + k] = lo;
-        aos[g * AOS_SIZE + RECORD + k] = hi;
+        aos[g * AOS_SIZE + RECORD + k] = simd::turned(hi);
       }
     }
   }
@@ -77,10 +78,10 @@ inline Groups randomGroups(Random& random, std::size_t count, int range, int siz
       Node n = emptyNode();
       if (!all_empty && random() % 8 < full_of_eight) {
         for (std::size_t k = 0; k < RECORD; ++k) {
-          const std::int16_t a = anyRecordValue(random, range);
+          const std::uint16_t a = anyRecordValue(random, range);
           const int b = a + static_cast<int>(random() % static_cast<unsigned>(size + 1));
           n.lo[k] = a;
-          n.hi[k] = static_cast<std::int16_t>(std::min(b, 32766));
+          n.hi[k] = static_cast<std::uint16_t>(std::min(b, MIDDLE + 32766));
         }
       }
       groups.nodes.push_back(n);

@@ -20,14 +20,14 @@ using Random = std::mt19937_64;
 struct LeafGroups {
   std::size_t arity;
   std::vector<std::uint32_t> features;  // 2 x 16 x arity
-  hwy::AlignedFreeUniquePtr<std::int16_t[]> soa, aos;
+  hwy::AlignedFreeUniquePtr<std::uint16_t[]> soa, aos;
   hwy::AlignedFreeUniquePtr<std::uint32_t[]> lanes;
 
-  LeafGroups(Random& random, std::size_t vertices, std::size_t arity, const std::int16_t* margin,
-             const hwy::AlignedFreeUniquePtr<std::int16_t[]>& of)
+  LeafGroups(Random& random, std::size_t vertices, std::size_t arity, const std::uint16_t* margin,
+             const hwy::AlignedFreeUniquePtr<std::uint16_t[]>& of)
       : arity(arity),
-        soa(hwy::AllocateAligned<std::int16_t>(2 * SOA_SIZE)),
-        aos(hwy::AllocateAligned<std::int16_t>(2 * AOS_SIZE)) {
+        soa(hwy::AllocateAligned<std::uint16_t>(2 * SOA_SIZE)),
+        aos(hwy::AllocateAligned<std::uint16_t>(2 * AOS_SIZE)) {
     const std::size_t empty_of_ten = random() % 3 == 0 ? 7 : 1;
     for (std::size_t i = 0; i < 2 * GROUP; ++i) {
       const bool empty = random() % 10 < empty_of_ten;
@@ -66,13 +66,14 @@ void forRandomGroups(const Test& test) {
     for (int round = 0; round < 60; ++round) {
       const std::size_t vertices = 40;
       const int spread = round % 3 == 0 ? 30000 : round % 3 == 1 ? 900 : 40;
-      const auto records = hwy::AllocateAligned<std::int16_t>(vertices * RECORD);
+      const auto records = hwy::AllocateAligned<std::uint16_t>(vertices * RECORD);
       for (std::size_t i = 0; i < vertices * RECORD; ++i) {
-        records[i] = static_cast<std::int16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * spread)) - spread);
+        records[i] =
+            static_cast<std::uint16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * spread)) - spread);
       }
-      std::int16_t margin[RECORD];
-      std::fill_n(margin, RECORD, static_cast<std::int16_t>(random() % 20));
-      const std::int16_t* widened = round % 2 ? margin : nullptr;
+      std::uint16_t margin[RECORD];
+      std::fill_n(margin, RECORD, static_cast<std::uint16_t>(random() % 20));
+      const std::uint16_t* widened = round % 2 ? margin : nullptr;
       const bool self = round % 4 < 2;
       const std::size_t own = round % 8 < 4 ? 2 : 3;
       const LeafGroups a(random, vertices, self ? own : round % 8 == 3 ? 2 : 1, widened, records);

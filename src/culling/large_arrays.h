@@ -1,0 +1,37 @@
+// Memory for large arrays that are read in any order: in huge pages where the system has them, so that a processor
+// need not look up so many addresses.
+#pragma once
+
+#include <hwy/aligned_allocator.h>
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+
+namespace dccd {
+
+/// Aligned for vector loads. What does not fill a huge page stays in small ones: no page holds more than the array.
+template <class T>
+hwy::AlignedFreeUniquePtr<T[]> makeLarge(std::size_t n) {
+  const auto allocate = [](void*, std::size_t bytes) -> void* {
+#ifdef MADV_HUGEPAGE
+    constexpr std::size_t HUGE_PAGE = std::size_t{1} << 21;
+    if (bytes >= HUGE_PAGE) {
+      void* memory = nullptr;
+      if (posix_memalign(&memory, HUGE_PAGE, bytes) != 0) return nullptr;
+      madvise(memory, bytes / HUGE_PAGE * HUGE_PAGE, MADV_HUGEPAGE);  // where it is refused, small pages serve as well
+      return memory;
+    }
+#endif
+    return std::malloc(bytes);
+  };
+  auto array = hwy::AllocateAligned<T>(
+      n, allocate, [](void*, void* memory) { std::free(memory); }, nullptr);
+  if (!array) throw std::bad_alloc();
+  return array;
+}
+
+}  // namespace dccd
