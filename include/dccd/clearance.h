@@ -42,8 +42,8 @@ struct ClearanceDistance {
   ClearanceStatus status = ClearanceStatus::UNKNOWN;
   double lower_m = 0;
   double upper_m = std::numeric_limits<double>::infinity();
-  double t = 1;  ///< [0, 1] of the step: where upper_m was taken
-  /// Where upper_m was taken: a point of either [m], fixed frame; not finite without one.
+  double t = 1;  ///< [0, 1] of the step: where upper_m was taken; TOUCHING over the step: its first contact
+  /// Where that was: a point of either [m], fixed frame; not finite without one.
   std::array<Vec3, 2> point{Vec3::Constant(std::numeric_limits<double>::quiet_NaN()),
                             Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
   /// The features that the points are on: one vertex, two of an edge, three of a face; the rest NO_INDEX, as is all

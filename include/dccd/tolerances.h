@@ -89,7 +89,7 @@ DCCD_MARGIN double SEGMENT_UNDERFLOW = 0x1p-1000;
 constexpr double SEGMENT_LARGEST_M = 0x1p30;  ///< [m] guard: keeps the underflow below that margin
 
 // Distances (step/clearance/hull_pair.h).
-/// [1] Slack of a bound on a distance, of the power of two that is not above the largest coordinate: 113 half ulps are
+/// [1] Slack of a bound on a distance, of the power of two that is not above the largest coordinate: 120 half ulps are
 /// proved. Larger: bounds are further apart where coordinates are large.
 constexpr double CLEARANCE = 0x1p-45;
 constexpr double CLEARANCE_BOX = 16 * HALF_ULP;   ///< [1] slack of the squared distance of two boxes: 6 half ulps

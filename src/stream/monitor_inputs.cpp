@@ -230,9 +230,10 @@ void Monitor::Impl::forgetReferences() {
   references.topologies.assign(bodies.size(), nullptr);
 }
 
-/// A minimum separation tells neighbours by a reference frame: the first one with this topology, or if no distance was
-/// asked for then (radii may come later), the first one for which it is. Radii that grow past those of the reference
-/// make a new list of left-out pairs; it is made for twice as large ones, so that this happens seldom.
+/// A minimum separation, and a body's distance from itself, tell neighbours by a reference frame: the first one with
+/// this topology, or if no distance was asked for then (radii may come later), the first one for which it is. Radii
+/// that grow past those of the reference make a new list of left-out pairs; it is made for twice as large ones, so that
+/// this happens seldom.
 void Monitor::Impl::keepReferences(Step& step, References& kept) const {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
@@ -242,7 +243,7 @@ void Monitor::Impl::keepReferences(Step& step, References& kept) const {
       topology = body.topology;
       frame = nullptr;
     }
-    const bool needed = meetsItself(body) && separates(body);
+    const bool needed = meetsItself(body) && (separates(body) || options.detector.clearance.self_m > 0);
     if (needed && !frame) frame = share(ReferenceFrame{*body.t0, {}});
     const double now_m = body.radius_m ? largest(*body.radius_m) : 0;
     const double listed_m = frame ? largest(frame->radius_m) : now_m;

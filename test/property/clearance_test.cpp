@@ -98,10 +98,12 @@ TEST(ClearanceProperty, PairsHoldTheTruth) {
     // Of triangles that are needles as thin as rounding the search misses the best points now and then.
     wider += upper_m - lower_m > std::max(wide_m, 1e-288);
     ASSERT_LE(upper_m - lower_m, std::max(16 * wide_m, 1e-288)) << "pair " << i << ", size " << largest_m;
-    // A direction that is not the best one, at another time, bounds the distance then, too.
-    const double later = draw(0, 64) / 64.0;
-    const Rational also(std::max(0.0, pair.lowerInMetres(pair.lowerAlong(nearest.direction, later))));
-    ASSERT_LE(also * also, trueSquaredDistance(hulls[0], hulls[1], later)) << "pair " << i << " at " << later;
+    // The directions of two times, or one of them twice, bound the distance at all times between two others, too.
+    const double from = draw(0, 63) / 64.0, to = draw(static_cast<int>(64 * from) + 1, 64) / 64.0;
+    const Vec3 at_end = draw(0, 3) == 0 ? nearest.direction : pair.at(to, wide_m).direction;
+    const Rational also(std::max(0.0, pair.lowerInMetres(pair.lowerOver({nearest.direction, at_end}, from, to))));
+    const double between = from + (to - from) * draw(0, 8) / 8;
+    ASSERT_LE(also * also, trueSquaredDistance(hulls[0], hulls[1], between)) << "pair " << i << " at " << between;
     ++(truth == 0 ? zero : positive);
   }
   std::cout << pairs << " pairs, " << zero << " of them meet, " << wider << " are wider than was asked for\n";

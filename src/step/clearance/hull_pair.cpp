@@ -200,10 +200,24 @@ double HullPair::along(const Vec3& n, std::size_t& a, std::size_t& b) const {
   return least - most;
 }
 
-double HullPair::lowerAlong(const Vec3& direction, double t) {
-  goTo(t);
-  std::size_t a, b;
-  return along(direction, a, b) - tolerance::CLEARANCE;
+double HullPair::lowerOver(const std::array<Vec3, 2>& direction, double from, double to) const {
+  constexpr double FAR = std::numeric_limits<double>::infinity();
+  const auto& [n0, n1] = direction;
+  std::array<double, 5> least{FAR, FAR, FAR, FAR, FAR}, most{-FAR, -FAR, -FAR, -FAR, -FAR};
+  for (int side = 0; side < 2; ++side) {
+    for (std::size_t i = 0; i < count_[side]; ++i) {
+      const Vec3 p = (1 - from) * t0_[side][i] + from * t1_[side][i], q = (1 - to) * t0_[side][i] + to * t1_[side][i];
+      const double first = n0.dot(p), last = n1.dot(q), later = n0.dot(q), earlier = n1.dot(p);
+      const std::array<double, 5> along{first, last, later, earlier, (later + earlier) / 2};
+      for (std::size_t k = 0; k < along.size(); ++k) {
+        least[k] = side == 0 ? std::min(least[k], along[k]) : least[k];
+        most[k] = side == 1 ? std::max(most[k], along[k]) : most[k];
+      }
+    }
+  }
+  const auto gap = [&](std::size_t k) { return least[k] - most[k]; };
+  const double both = std::min({gap(0), gap(1), gap(4)});
+  return std::max({both, std::min(gap(0), gap(2)), std::min(gap(1), gap(3))}) - tolerance::CLEARANCE;
 }
 
 void HullPair::takeMeans(const Simplex& simplex, const Combination& of, Nearest& nearest) const {

@@ -10,7 +10,7 @@
 // where t is a multiple of 2^-52, so that 1 - t is exact: off by at most 3 u 2 + u 2 = 8 u on each axis.
 // - n.a of a computed n: 3 u sqrt(3) 2 for its own operations, sqrt(3) 8 u for the corner's error, 25 u in all; the
 //   difference of two: 50 u and its own rounding, 7 u, as no distance is above 2 sqrt(3) 2 < 7. n is no longer than
-//   1 + 8 u, which is 56 u of a distance. In all 113 u.
+//   1 + 8 u, which is 56 u of a distance. In all 113 u. The mean of two such products is rounded once more: 120 u.
 // - A mean of corners: weights add up to 1 within 4 u, 14 u of a length; its operations 3 u sqrt(3) 2, the corners'
 //   error sqrt(3) 8 u; 39 u in all. The difference of two 78 u, and its length's own roundings 4 u of it, 28 u. In all
 //   106 u.
@@ -59,8 +59,12 @@ class HullPair {
   /// The bounds at a time, a multiple of 2^-52, no further apart than `wide_m` or 1e-9 of the distance where the search
   /// finds the nearest points, which it does but for rounding.
   Nearest at(double t, double wide_m);
-  /// How far apart they are at least along the direction at a time.
-  double lowerAlong(const Vec3& direction, double t);
+  /// How far apart they are at least in an interval of time, by a unit vector (or zero) at either end. Each bounds all
+  /// of it: min n.a - max n.b is concave in t. So do the two together: with n(s) = (1 - s) n0 + s n1, no longer than 1,
+  /// the products n.a - n.b are quadratic in s, and not below their Bernstein coefficients: those of n0 at the first
+  /// end, of n1 at the last, and the mean of n0 at the last and n1 at the first. Of features that turn, as their normal
+  /// does, the single ones err by the interval's length, the two together by its square.
+  double lowerOver(const std::array<Vec3, 2>& direction, double from, double to) const;
 
   double lowerInMetres(double lower) const;
   double upperInMetres(double upper) const;

@@ -10,7 +10,7 @@ constexpr std::uint64_t WORK = 64;      // boxes and times between two looks at 
 
 struct Interval {
   double from, to, lower;
-  Vec3 direction[2];  // that held at either end
+  std::array<Vec3, 2> direction;  // that held at either end
 };
 
 }  // namespace
@@ -59,8 +59,8 @@ Nearest NearestSearch::takeAt(double t) {
   return nearest;
 }
 
-/// Of the pair over the whole step. A direction bounds the distance over an interval by what it says at both ends, for
-/// min n.a - max n.b is concave in t. It errs by the square of the interval's length, so that few halvings do.
+/// Of the pair over the whole step. The directions at an interval's ends bound the distance over it, and err by the
+/// square of its length, so that few halvings do.
 void NearestSearch::refine() {
   std::array<Interval, 64> left;  // a path to one interval leaves one beside each of its halvings
   std::size_t count = 1;
@@ -68,14 +68,11 @@ void NearestSearch::refine() {
   left[0] = {0, 1, 0, {at_end, at_end}};
   for (int halvings = 0; count > 0; ++halvings) {
     Interval one = left[--count];
-    for (const Vec3& n : one.direction) {
-      one.lower = std::max(one.lower, std::min(pair_.lowerAlong(n, one.from), pair_.lowerAlong(n, one.to)));
-    }
+    one.lower = std::max(one.lower, pair_.lowerOver(one.direction, one.from, one.to));
     double lower_m = pair_.lowerInMetres(one.lower);
     if (lower_m < enough_m_ && halvings == 0) {
       one.direction[0] = takeAt(0).direction;
-      const Vec3& n = one.direction[0];
-      one.lower = std::max(one.lower, std::min(pair_.lowerAlong(n, 0), pair_.lowerAlong(n, 1)));
+      one.lower = std::max(one.lower, pair_.lowerOver(one.direction, 0, 1));
       lower_m = pair_.lowerInMetres(one.lower);
     }
     const bool late = lower_m < enough_m_ && isLate();

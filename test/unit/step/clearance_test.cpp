@@ -412,6 +412,25 @@ TEST(Clearance, OfABodyAndItselfIsTheSameWithoutTheStepsBefore) {
   EXPECT_GT(statuses[static_cast<std::size_t>(ClearanceStatus::MEASURED)], 2);
 }
 
+/// Two rods across each other, 1 cm apart, that are tilted together: at each time their normal is another one.
+TEST(Clearance, OfEdgesThatTurnIsAsNarrowAsItIsAskedFor) {
+  const Topology rod = Topology::polyline(2);
+  const auto tilted = [](const Positions& rod, double angle) {
+    Positions turned;
+    for (const Vec3& p : rod) turned.push_back(Eigen::AngleAxisd(angle, Vec3::UnitY()) * p);
+    return turned;
+  };
+  const Positions above{{-1, 0, 0.01}, {1, 0, 0.01}}, below{{0, -1, 0}, {0, 1, 0}};
+  Step step = stepOf(bodyOf("above", rod), tilted(above, 0), tilted(above, 0.5));
+  step.bodies.push_back(moving(bodyOf("below", rod), tilted(below, 0), tilted(below, 0.5)));
+  Options options = asking();
+  options.clearance.tolerance_m = 1e-6;
+  const ClearanceDistance over_step = rowOf(distance(step, options), 0, 1).over_step;
+  EXPECT_EQ(over_step.status, ClearanceStatus::MEASURED);
+  EXPECT_LE(over_step.upper_m - over_step.lower_m, 1e-6);
+  EXPECT_NEAR(over_step.upper_m, 0.01 * std::cos(0.25), 1e-6) << "half way, of the chord's middle";
+}
+
 TEST(Clearance, IsStillBoundedWhereTheTimeRanOut) {
   const Step step = wavySheets(0);
   const std::vector<Clearance> whole = distance(step, asking());

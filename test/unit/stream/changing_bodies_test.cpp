@@ -131,6 +131,53 @@ TEST_F(ChangingBodies, StepsThatWaitAreAnsweredWithIt) {
   EXPECT_EQ(outcome.step->bodies.size(), 3u);
 }
 
+/// A rope of eight points that are `apart` from each other: straight, or as a hairpin whose ends are one such way
+/// apart.
+MeshFrame rope(StampNs stamp_ns, double apart, bool bent) {
+  static const auto topology = std::make_shared<const Topology>(Topology::polyline(8));
+  MeshFrame frame{stamp_ns, topology, {}};
+  for (int i = 0; i < 8; ++i) frame.positions.push_back(apart * Vec3(bent ? std::min(i, 7 - i) : i, bent && i > 3, 0));
+  return frame;
+}
+
+// Which of a body's features are neighbours follows from its first frame: 5 m of the rope lie between the segments at
+// its ends, though later it has shrunk by half. Neither another body that comes, nor distances that are asked for only
+// now, make another frame the first.
+TEST(ChangingBodiesDistances, OfABodyAndItselfGoOn) {
+  MonitorOptions options = loose();
+  options.detector.clearance.self_m = 3.5;
+  options.detector.clearance.wanted = true;
+  Monitor monitor(options, {named("rope")});
+  StampNs stamp_ns = 0;
+  const auto step = [&](double apart, bool bent) {
+    stamp_ns += 100 * MS;
+    monitor.push(0, rope(stamp_ns, apart, bent), NOW);
+    return only(monitor);
+  };
+  const auto expectMeasured = [](const Outcome& outcome) {
+    ASSERT_FALSE(outcome.clearances.empty()) << outcome.reason;
+    EXPECT_EQ(outcome.clearances[0].at_end.status, ClearanceStatus::MEASURED);
+    EXPECT_NEAR(outcome.clearances[0].at_end.upper_m, 0.5, 1e-3);
+  };
+  step(1, false);
+  step(0.5, true);
+  expectMeasured(step(0.5, true));
+  monitor.setBody(1, named("box"));
+  monitor.push(1, tip(monitor.nextStart(), 50), NOW);
+  monitor.push(1, tip(stamp_ns + 100 * MS, 50), NOW);
+  expectMeasured(step(0.5, true));
+  options.detector.clearance.wanted = false;
+  Monitor later(options, {named("rope")});
+  later.push(0, rope(0, 1, false), NOW);
+  later.push(0, rope(100 * MS, 0.5, true), NOW);
+  Outcome outcome;
+  while (later.next(NOW, outcome)) EXPECT_TRUE(outcome.clearances.empty());
+  options.detector.clearance.wanted = true;
+  later.setOptions(options);
+  later.push(0, rope(200 * MS, 0.5, true), NOW);
+  expectMeasured(only(later));
+}
+
 TEST_F(ChangingBodies, WhatCannotBeIsRefusedAndAllStays) {
   step({1});
   Body apart = named("apart");
