@@ -1,6 +1,5 @@
 #include "node/monitor_log.h"
 
-#include <chrono>
 
 #include <ros/console.h>
 
