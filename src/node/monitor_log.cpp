@@ -1,6 +1,5 @@
 #include "node/monitor_log.h"
 
-
 #include <ros/console.h>
 
 #include "input/short_text.h"
