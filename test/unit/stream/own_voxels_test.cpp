@@ -124,6 +124,24 @@ TEST_F(OwnVoxels, OfARopeTheyLieAlongIt) {
   EXPECT_EQ(outcome.obstacle->leafCount(), 101u) << "what is beside it is an obstacle";
 }
 
+TEST_F(OwnVoxels, OfAStaticBodyTheyLieWhereItStands) {
+  Body held = named("board");
+  held.motion = BodyMotionKind::STATIC;
+  held.own_voxels_m = 0.05;
+  MonitorOptions options = loose();
+  options.detector.obstacle_expected = true;
+  monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), held});
+  monitor_->push(1, sheet(0, 0.55), NOW);
+  feed(0, 5);
+  map(0, slab(1));
+  feed(100 * MS, 5);
+  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{5, 5, 7}});
+  const Outcome outcome = feed(200 * MS, 5);
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
+  EXPECT_EQ(own(outcome), 25u);
+  EXPECT_EQ(outcome.obstacle->leafCount(), 101u) << "what is above it is an obstacle";
+}
+
 TEST_F(OwnVoxels, WhatWasThereBeforeStaysAnObstacle) {
   hoverAboveFloor();
   map(150 * MS, slab(1) + voxelsOf(0.55));
