@@ -11,7 +11,6 @@
 #include "apps/analyze_bag/result_bag.h"
 #include "apps/analyze_bag/study_runner.h"
 #include "apps/decimal_options.h"
-#include "dccd/accuracy.h"
 #include "dccd/simd_target.h"
 #include "node/bag_replay.h"
 #include "node/robot_source.h"

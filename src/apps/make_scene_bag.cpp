@@ -1,6 +1,5 @@
 // make_scene_bag SCENE.yaml OUT.bag: records a scene's cloth, octomap and transforms from a physics simulation.
 // make_scene_bag SCENE.yaml OUT.bt: its map alone.
-#include <cstdint>
 #include <exception>
 #include <iostream>
 #include <string>

@@ -1,7 +1,6 @@
 #include "dccd/topology.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace dccd {
 namespace {

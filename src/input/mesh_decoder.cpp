@@ -1,7 +1,5 @@
 #include "input/mesh_decoder.h"
 
-#include <algorithm>
-#include <cmath>
 #include <sstream>
 
 #include "input/marker_ropes.h"

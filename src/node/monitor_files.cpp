@@ -1,7 +1,6 @@
 // What a pipeline is made of before the first message: the files of its bodies, and the vertices that parameters name.
 #include <algorithm>
 #include <stdexcept>
-#include <utility>
 
 #include "input/mesh_resource.h"
 #include "node/monitor_pipeline.h"

@@ -1,7 +1,5 @@
 #include "node/monitor_log.h"
 
-#include <chrono>
-
 #include <ros/console.h>
 
 #include "input/short_text.h"

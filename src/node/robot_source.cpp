@@ -8,7 +8,6 @@
 #include <ros/console.h>
 
 #include "config/parameter_tree.h"
-#include "input/mesh_formats.h"
 #include "input/mesh_resource.h"
 #include "robot/robot_model.h"
 

@@ -1,6 +1,5 @@
 #include "octomap/map_builder.h"
 
-#include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <string>

@@ -1,8 +1,5 @@
 #include "output/patch_messages.h"
 
-#include <algorithm>
-#include <cstdio>
-#include <map>
 #include <set>
 
 #include "dccd/contact_fields.h"

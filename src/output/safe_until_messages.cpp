@@ -1,7 +1,6 @@
 #include "output/safe_until_messages.h"
 
 #include <algorithm>
-#include <limits>
 #include <sstream>
 
 #include "output/output_messages.h"

@@ -1,7 +1,6 @@
 #include "report/accuracy_study.h"
 #include "stream/quantile.h"
 
-#include <algorithm>
 #include <fstream>
 #include <iomanip>
 #include <numeric>

@@ -1,7 +1,6 @@
 #include "robot/urdf_text.h"
 
 #include <mutex>
-#include <utility>
 
 #include <console_bridge/console.h>
 #include <tinyxml2.h>

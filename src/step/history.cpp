@@ -4,7 +4,6 @@
 #include <cstring>
 #include <type_traits>
 
-#include "dccd/accuracy.h"
 #include "step/clearance/clearance_finder.h"
 
 namespace dccd {

@@ -1,6 +1,5 @@
 // What a step is made of: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
-#include <cmath>
 #include <iomanip>
 #include <optional>
 #include <sstream>

@@ -7,7 +7,6 @@
 #include <iostream>
 #include <limits>
 #include <sstream>
-#include <stdexcept>
 #include <vector>
 
 #include "apps/analyze_bag/thinned_mesh.h"

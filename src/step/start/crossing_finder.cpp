@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "obstacle/burst.h"
 #include "step/start/segment_triangle.h"
 
 namespace dccd {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 #include "elementary/exact_integer.h"
 #include "elementary/exact_short_integer.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "dccd/voxel_surface.h"
 
@@ -57,6 +58,22 @@ TEST(ObstacleCheck, AVertexMeetsAFaceInItsCell) {
   EXPECT_FALSE(contact.initial);
   EXPECT_FALSE(contact.leaving);
   EXPECT_GE(answer.stats.pairs_in, 1u);
+}
+
+TEST(ObstacleCheck, WhatMeetsAFaceAfterTheLeastOfTimesIsNotInitial) {
+  const auto surface = unitVoxels({leafAt(32768, 32768, 32767)});
+  for (const auto& [rung, cell] : {std::pair(Accuracy::EXACT, CELL), std::pair(Accuracy::CONSERVATIVE, 0x1p-52)}) {
+    ObstacleOptions options;
+    options.accuracy.rung = rung;
+    const Answer answer =
+        run(*surface, ROPE, {{0.5, 0.5, 1e-300}, {0.5, 0.5, 5}}, {{0.5, 0.5, -0.5}, {0.5, 0.5, 5}}, options);
+    ASSERT_EQ(answer.contacts.size(), 1u);
+    const Contact& contact = answer.contacts[0];
+    EXPECT_EQ(contact.certainty, Certainty::CERTAIN);
+    EXPECT_EQ(contact.toc_lower, 0);
+    EXPECT_EQ(contact.toc_upper, cell);
+    EXPECT_FALSE(contact.initial);
+  }
 }
 
 TEST(ObstacleCheck, TheLastMomentCounts) {

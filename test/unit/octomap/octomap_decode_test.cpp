@@ -200,6 +200,10 @@ TEST(OctomapDecode, ErrorsNameTheFieldAndTheValue) {
   EXPECT_NE(errorOf({"OcTree", 0.2, true, header + "ab"}).find("0.1"), std::string::npos);
   EXPECT_NE(errorOf({"OcTree", 0.1, false, header + "ab"}).find(".bt"), std::string::npos);
   EXPECT_NE(errorOf({"ColorOcTree", 0.1, true, header + "ab"}).find("ColorOcTree"), std::string::npos);
+  const std::string begin = "# Octomap OcTree binary file\nid OcTree\nres 0.1\n";
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, begin + "size 0\ndata\nab"}).find("2 bytes of data follow"),
+            std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, begin + "sizes 3\ndata\nab"}).find("keyword 'sizes'"), std::string::npos);
   EXPECT_NE(errorOf({"OcTree", 0.1, true, "# Octomap OcTree binary file\nid OcTree\n"}).find("data"),
             std::string::npos);
 }

@@ -429,6 +429,16 @@ class PlyGrammar : public Grammar {
     if (big) std::reverse(bytes, bytes + sizeof value);
     out.append(bytes, sizeof value);
   }
+  /// Its least number, 1 and its largest one, in either order of bytes.
+  template <typename T>
+  void expectBinary(const std::string& type) {
+    using Limits = std::numeric_limits<T>;
+    for (const bool big : {false, true}) {
+      std::string text = head(xyz(1, type), big ? "binary_big_endian" : "binary_little_endian");
+      for (const T value : {Limits::min(), T{1}, Limits::max()}) put(text, value, big);
+      EXPECT_EQ(read("a.ply", text).positions.at(0), Vec3(Limits::min(), 1, Limits::max())) << type;
+    }
+  }
   /// With an element with a list before the faces, and lists and scalars beside their corners.
   template <typename Real = float>
   static std::string binary(bool big, const std::string& end = "\n") {
@@ -520,6 +530,12 @@ TEST_F(PlyGrammar, Vertices) {
        {"char", "int8", "short", "int16", "int", "int32", "uchar", "uint8", "ushort", "uint16", "uint", "uint32"}) {
     EXPECT_EQ(read("a.ply", head(xyz(1, type)) + "1 2 3\n").positions[0], Vec3(1, 2, 3)) << type;
   }
+  expectBinary<std::int8_t>("char");
+  expectBinary<std::uint8_t>("uchar");
+  expectBinary<std::int16_t>("short");
+  expectBinary<std::uint16_t>("ushort");
+  expectBinary<std::int32_t>("int");
+  expectBinary<std::uint32_t>("uint");
   expectRefused("a.ply", head("element vertex 1\nproperty float x\nproperty float y\n") + "0 0\n", "a.ply: ", "'z'");
   expectRefused("a.ply", head(xyz(1) + "property float x\n") + "0 0 0 0\n", "a.ply: ", "'x'");
   expectRefused("a.ply", head(faceElement()) + faces(), "a.ply: ", "no vertices");

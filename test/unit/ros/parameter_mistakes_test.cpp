@@ -88,6 +88,12 @@ TEST(Parameters, ValuesOutOfRangeAreRefused) {
 TEST(Parameters, ContradictionsSayWhatToWrite) {
   expectMistakes({
       {"topology: {rows: 3}", "both or neither"},
+      {"topology: {rows: 1, cols: 4}", "~topology/rows and cols must be 2 or more"},
+      {"topology: {source: polyline, rows: 2, cols: 3}", "~topology/rows has no meaning for a polyline"},
+      {"topic: /a, bodies: {cloth: {topic: /b}}", "~topic (mesh:= of the launch files) has no place beside bodies"},
+      {"exclude_boxes: [[1, 0, 0, 0, 1, 1]]", "~exclude_boxes holds a box whose min exceeds its max"},
+      {"exclude_boxes: [[1, 0]]", "~exclude_boxes must hold lists of 6 numbers"},
+      {"exclude_boxes: [[a, 0, 0, 1, 1, 1]]", "~exclude_boxes holds a string where a number is needed"},
       {"obstacle_cloud_topic: /points, octomap_topic: /map",
        "the map is to come both from the clouds on obstacle_cloud_topic '/points' and from octomap_topic '/map'; "
        "remove "

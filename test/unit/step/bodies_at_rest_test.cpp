@@ -83,6 +83,35 @@ TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
   EXPECT_EQ(run(rest, rest).stats.bodies_kept, 0u) << "after a refused step nothing is known to be in order";
 }
 
+// Bodies that are far are passed by for what all positions span, of which some are no numbers, or have no sum.
+TEST(BodiesAtRest, WhatIsNotFiniteHidesNoContact) {
+  const Topology one = Topology::fromTriangles(3, {{0, 1, 2}}),
+                 two = Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}});
+  const Positions tip{{0.2, 0.2, 0.5}, {0.2, 0.3, 2}, {0.3, 0.2, 2}};
+  const Positions cloth{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 0, 0}, {6, 0, 0}, {5, 1, 0}};
+  for (const double odd : {std::nan(""), HUGE_VAL, -HUGE_VAL, 1e308}) {
+    for (const int when : {1, 2, 3}) {
+      Positions ends[] = {cloth, cloth};
+      for (int end = 0; end < 2; ++end) {
+        if (when >> end & 1) ends[end][4] = Vec3::Constant(odd);
+      }
+      Step step = stepOf(bodyOf("cloth", two), ends[0], ends[1]);
+      for (const double x : {0.0, 1000.0}) {
+        Body body = bodyOf(x == 0 ? "tool" : "far", one);
+        body.rigid = true;
+        body.against_obstacle = false;
+        step.bodies.push_back(moving(body, movedBy(tip, {x, 0, 0}), movedBy(tip, {x, 0, -1})));
+      }
+      Options slow;
+      slow.broad_phase = BroadPhase::BRUTE_FORCE;
+      slow.keep_bounds = false;
+      const Outcome result = Detector().run(step);
+      EXPECT_EQ(result.contacts.size(), 1u) << odd << " at " << when;
+      EXPECT_EQ(difference(result.contacts, Detector(slow).run(step).contacts), "") << odd << " at " << when;
+    }
+  }
+}
+
 /// Everything that can happen to a stream, at random.
 TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
   const Waved scene;

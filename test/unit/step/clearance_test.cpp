@@ -192,6 +192,18 @@ Positions folded(double gap_m) {
   return positions;
 }
 
+TEST(Clearance, IsFromEdgesOnNoFaceThatIsLookedAt) {
+  const Positions square{{0, -1, 0}, {-1, 0, 0}, {1, 0, 0}, {0, 1, 0}}, tip{{0, 0, 0.25}, {0.1, 0, 1}, {0, 0.1, 1}};
+  const Topology square_of_faces = Topology::fromTriangles(4, {{0, 1, 2}, {1, 3, 2}});
+  for (const Topology& topology : {square_of_faces, Topology::fromEdges(4, {{1, 2}})}) {
+    Body body = bodyOf("body", topology);
+    body.vertex_mask = {0, 3};  // its diagonal is left
+    const Clearance row = rowOf(distance(resting(body, square, bodyOf("tip", TRIANGLE), tip), asking()), 0, 1);
+    expectMeasured(row.at_end, 0.25);
+    EXPECT_EQ(row.at_end.vertex[0], (std::array<Index, 3>{1, 2, NO_INDEX}));
+  }
+}
+
 TEST(Clearance, OfAFoldIsFromLayerToLayer) {
   const Positions flat = gridAt(3, 21, 0.1);
   Body cloth = bodyOf("cloth", Topology::grid(3, 21));

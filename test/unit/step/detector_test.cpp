@@ -209,6 +209,12 @@ TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
   options = Options();
   options.step_budget_ms = -1;
   expectContains(refused(step.motion(), options), {"step_budget_ms", "-1"});
+  options = Options();
+  options.max_compute_ms = NOT_A_NUMBER;
+  expectContains(refused(step.motion(), options), {"max_compute_ms", "nan"});
+  motion = step.motion();
+  motion.bodies[0].reference = share(ReferenceFrame{Positions(3, Vec3::Zero()), {0.1}});
+  expectContains(refused(motion), {"body_0", "3", "reference frame"});
   detector.setOptions(Options());
   // And goes on as if nothing had happened.
   EXPECT_EQ(difference(detector.run(step.motion()).contacts, runOnce(step, {}).contacts), "");

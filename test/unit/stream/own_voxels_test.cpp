@@ -107,6 +107,41 @@ TEST_F(OwnVoxels, WhatAMapFirstShowsWhereTheBodyIsIsNoObstacle) {
   EXPECT_EQ(assuranceOf(feed(200 * MS, 0.55)).touching, Touching::LASTING) << "none are own where none may be";
 }
 
+TEST_F(OwnVoxels, OfARopeTheyLieAlongIt) {
+  const auto topology = share(Topology::polyline(9));
+  const auto feedRope = [&](StampNs stamp_ns) {
+    monitor_->push(0, {stamp_ns, topology, gridAt(1, 9, 0.05, {0.31, 0.55, 0.55})}, NOW);
+    return only(*monitor_);
+  };
+  feedRope(0);
+  map(0, slab(1));
+  feedRope(100 * MS);
+  const Cells along{{3, 5, 5}, {4, 5, 5}, {5, 5, 5}, {6, 5, 5}, {7, 5, 5}}, beside{{5, 7, 5}};
+  map(150 * MS, slab(1) + along + beside);
+  const Outcome outcome = feedRope(200 * MS);
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
+  EXPECT_EQ(own(outcome), 5u);
+  EXPECT_EQ(outcome.obstacle->leafCount(), 101u) << "what is beside it is an obstacle";
+}
+
+TEST_F(OwnVoxels, OfAStaticBodyTheyLieWhereItStands) {
+  Body held = named("board");
+  held.motion = BodyMotionKind::STATIC;
+  held.own_voxels_m = 0.05;
+  MonitorOptions options = loose();
+  options.detector.obstacle_expected = true;
+  monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), held});
+  monitor_->push(1, sheet(0, 0.55), NOW);
+  feed(0, 5);
+  map(0, slab(1));
+  feed(100 * MS, 5);
+  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{5, 5, 7}});
+  const Outcome outcome = feed(200 * MS, 5);
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
+  EXPECT_EQ(own(outcome), 25u);
+  EXPECT_EQ(outcome.obstacle->leafCount(), 101u) << "what is above it is an obstacle";
+}
+
 TEST_F(OwnVoxels, WhatWasThereBeforeStaysAnObstacle) {
   hoverAboveFloor();
   map(150 * MS, slab(1) + voxelsOf(0.55));
