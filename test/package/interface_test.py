@@ -7,7 +7,7 @@ from checkout import CHECKOUT
 
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
 ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
-READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|sections?)\(\s*"(\w+)"')
+READ = re.compile(r'(\w+)\.(?:get|frame|choice|number|integer|indices|list|raw|sections?)\(\s*"(\w+)"')
 CONFIG = ''.join(re.sub(r'choiceOf\((\w+), ', r'\1.choice(', path.read_text()) for path in sorted((CHECKOUT / 'src/config').glob('*.cpp')))
 # What a function of src/config reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/',
