@@ -156,7 +156,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
         last = said[-1][0]
         self.assertEqual((last.level, last.message), (DiagnosticStatus.OK, 'OK'))
         values = {pair.key: pair.value for pair in last.values}
-        rows = re.findall(r'put\(status, "([^"]+)"', (CHECKOUT / 'src/output/diagnostics.cpp').read_text())
+        rows = re.findall(r'putValue\(status, "([^"]+)"', (CHECKOUT / 'src/output/diagnostics.cpp').read_text())
         self.assertEqual(set(values), {row for row in rows if 'latency' not in row}, 'the rows of the node; nobody waited')
         frames = sum(topic == '/cloth' for topic, _, _ in self.messages)
         self.assertGreater(int(values['frames received']), frames // 2)
