@@ -5,16 +5,32 @@
 file(GLOB FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/*_fuzz.cpp)
 file(GLOB DECODER_FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/decoders/*_fuzz.cpp)
 
+# What the decoders call of the node. In the ordinary build fuzz_tests links these files and no others of it, so that the
+# list is whole. Objects, not an archive: a message type registers itself, and nothing else asks for its file.
+file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
+set(DECODER_SOURCES ${MESSAGE_TYPES}
+  src/apps/make_scene_bag/physics/scene_file.cpp src/apps/make_scene_bag/physics/shapes.cpp
+  src/config/parameter_reader.cpp src/config/parameter_yaml.cpp src/input/dae_file.cpp src/input/depth_surface.cpp
+  src/input/known_types.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp src/input/mesh_file.cpp
+  src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp src/input/ply_header.cpp
+  src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
+  src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
+
 if(NOT DEFORMABLE_CCD_FUZZ)
   if(DEFORMABLE_CCD_CORE_ONLY)
     add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} LIBRARIES deformable_ccd_archive)
-  else()
-    if(NOT TARGET deformable_ccd_physics)
-      list(FILTER DECODER_FUZZ_SOURCES EXCLUDE REGEX "scene_file")
-    endif()
-    add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES}
-      LIBRARIES deformable_ccd_ros $<TARGET_NAME_IF_EXISTS:deformable_ccd_physics>)
+    return()
   endif()
+  add_library(deformable_ccd_decoders OBJECT EXCLUDE_FROM_ALL ${DECODER_SOURCES})
+  add_dependencies(deformable_ccd_decoders ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
+  target_include_directories(deformable_ccd_decoders PUBLIC src)
+  target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  target_compile_options(deformable_ccd_decoders PRIVATE ${COLD_CODE})
+  set_target_properties(deformable_ccd_decoders PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
+  target_link_libraries(deformable_ccd_decoders PUBLIC
+    deformable_ccd_headers yaml-cpp ${TINYXML2_LIBRARY} ${catkin_LIBRARIES} ${PCL_COMMON_LIBRARIES})
+  add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES}
+    LIBRARIES deformable_ccd_decoders deformable_ccd_archive)
   return()
 endif()
 
@@ -37,16 +53,7 @@ foreach(library rosconsole roscpp_serialization rostime)
 endforeach()
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
-# Objects, not an archive: a message type registers itself, and nothing else asks for its file. What one of these files
-# needs of another one has to be here: test/package/fuzzers_test.py looks for it in each run.
-file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
-add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
-  src/apps/make_scene_bag/physics/scene_file.cpp src/apps/make_scene_bag/physics/shapes.cpp
-  src/config/parameter_reader.cpp src/config/parameter_yaml.cpp src/input/dae_file.cpp src/input/depth_surface.cpp
-  src/input/known_types.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp src/input/mesh_file.cpp
-  src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp src/input/ply_header.cpp
-  src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
-  src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
+add_library(deformable_ccd_decoders OBJECT ${DECODER_SOURCES})
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
