@@ -89,9 +89,9 @@ TEST_F(RobotModel, EveryGeometryIsWhereTheLinkHasIt) {
   }
   EXPECT_GT(volume(*partOf(robot, "stl").mesh), 0);
   EXPECT_GT(volume(*partOf(robot, "mirrored").mesh), 0) << "a mirrored mesh is not turned inside out";
-  // Of the pyramid: (0.2, 0.1, 0.01), (0, 0, 0.06), (0.2, 0, 0.01); single precision of assimp.
+  // Of the pyramid: (0.2, 0.1, 0.01), (0, 0, 0.06), (0.2, 0, 0.01).
   for (const Vec3& corner : {Vec3(0.8, 2.2, 3.03), Vec3(1, 2, 3.18), Vec3(1, 2.2, 3.03)}) {
-    EXPECT_TRUE(hasVertex(partOf(robot, "dae"), corner, 1e-7)) << corner.transpose();
+    EXPECT_TRUE(hasVertex(partOf(robot, "dae"), corner, 1e-15)) << corner.transpose();
   }
   for (const Vec3& corner : {Vec3(0.2, 0.1, 0.01), Vec3(0, 0, 0.06), Vec3(0.2, 0, 0.01)}) {
     EXPECT_TRUE(hasVertex(partOf(robot, "obj"), corner, 0)) << corner.transpose();
