@@ -132,8 +132,8 @@ set_source_files_properties(test/unit/ros/include_order_core_first_test.cpp test
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES}
   LIBRARIES deformable_ccd_live_support deformable_ccd_ros ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
-# These six name what they write and read alike, or are about the order of headers.
 set_target_properties(ros_tests PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
+# These six name what they write and read alike, or are about the order of headers.
 set_source_files_properties(test/unit/ros/hostile_input_test.cpp test/unit/ros/include_order_core_first_test.cpp
   test/unit/ros/include_order_messages_first_test.cpp test/unit/ros/mesh_decoder_test.cpp
   test/unit/ros/mesh_file_grammar_test.cpp test/unit/ros/message_grammar_test.cpp
