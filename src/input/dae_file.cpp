@@ -38,6 +38,13 @@ void forChildren(const XMLElement& at, const char* name, const See& see) {
   for (auto* child = at.FirstChildElement(name); child; child = child->NextSiblingElement(name)) see(*child);
 }
 
+/// The one of this name; null: there is none.
+const XMLElement* onlyChild(const XMLElement& at, const char* name) {
+  const XMLElement* child = at.FirstChildElement(name);
+  if (child && child->NextSiblingElement(name)) refuse(at, std::string("has several <") + name + ">");
+  return child;
+}
+
 /// Calls `see` with each word of the element's text.
 template <class See>
 void forEachWord(const XMLElement& at, const See& see) {
@@ -187,7 +194,7 @@ class DaeReader {
       refuse(use, "is not read; write the mesh where its skin or morph puts it");
     });
     forChildren(node, "instance_geometry", [&](const XMLElement& use) {
-      const XMLElement* mesh = ids_.find(use, "url", "geometry").FirstChildElement("mesh");
+      const XMLElement* mesh = onlyChild(ids_.find(use, "url", "geometry"), "mesh");
       if (!mesh) refuse(use, "has the url '" + attribute(use, "url") + "', of a geometry without a <mesh>");
       for (auto* part = mesh->FirstChildElement(); part; part = part->NextSiblingElement()) addPrimitive(*part, pose);
     });
@@ -208,7 +215,8 @@ class DaeReader {
     forChildren(at, "vcount", [&](const XMLElement& vcount) {
       forEachIndex(vcount, [&](std::size_t size) { sizes.push_back(size); });
     });
-    std::size_t lists = 0, polygons = sizes.size();
+    const std::size_t vcounts = sizes.size();
+    std::size_t lists = 0, polygons = 0;
     forChildren(at, "p", [&](const XMLElement& p) {
       const Positions list = cornersOf(at, p, pose);
       const auto add = [&](std::initializer_list<std::size_t> places) {
@@ -223,8 +231,8 @@ class DaeReader {
       if (!listed) {
         const std::size_t size = triangles ? 3 : lines ? 2 : std::max<std::size_t>(list.size(), 1);
         sizes.assign(list.size() / size, size);
-        polygons += sizes.size();
       }
+      polygons += sizes.size();
       std::size_t end = 0;
       for (const std::size_t size : sizes) {
         if (size > list.size() - end) refuse(p, "ends within a polygon");
@@ -235,8 +243,9 @@ class DaeReader {
       if (end < list.size()) refuse(p, "has more indices than its polygons have corners");
     });
     const std::size_t count = triangles || lines || listed ? polygons : lists;
-    if (count != countOf(at, "count", count)) {
-      refuse(at, "has " + std::to_string(count) + ", and a count of " + attribute(at, "count"));
+    const std::size_t said = countOf(at, "count", listed ? vcounts : count);
+    if (count != said || (listed && count != vcounts)) {
+      refuse(at, "has " + std::to_string(count) + ", and a count of " + std::to_string(said));
     }
   }
 
@@ -268,7 +277,9 @@ class DaeReader {
   const Positions& positionsOf(const XMLElement& vertices) {
     const XMLElement* source = nullptr;
     forChildren(vertices, "input", [&](const XMLElement& input) {
-      if (attribute(input, "semantic") == "POSITION") source = &ids_.find(input, "source", "source");
+      if (attribute(input, "semantic") != "POSITION") return;
+      if (source) refuse(input, "is the second POSITION");
+      source = &ids_.find(input, "source", "source");
     });
     if (!source) refuse(vertices, "has no <input> of POSITION");
     const auto [known, is_new] = positions_.try_emplace(source);
@@ -277,8 +288,8 @@ class DaeReader {
   }
 
   Positions readPositions(const XMLElement& source) {
-    const XMLElement* technique = source.FirstChildElement("technique_common");
-    const XMLElement* accessor = technique ? technique->FirstChildElement("accessor") : nullptr;
+    const XMLElement* technique = onlyChild(source, "technique_common");
+    const XMLElement* accessor = technique ? onlyChild(*technique, "accessor") : nullptr;
     if (!accessor) refuse(source, "has no <accessor>");
     const XMLElement& array = ids_.find(*accessor, "source", "float_array");
     const std::vector<double> numbers = numbersOf(array);

@@ -811,6 +811,17 @@ TEST_F(DaeGrammar, WhatContradictsItself) {
   expectBad("count=\"4\"", "count=\"5\"", "<accessor> goes beyond the 12 numbers of '#a'");
   expectBad("stride=\"3\"", "stride=\"4\"", "<accessor> goes beyond");
   for (const char* stride : {"stride=\"2\"", ""}) expectBad("stride=\"3\"", stride, "has more <param> than its stride");
+  const std::string position = "<input semantic=\"POSITION\" source=\"#p\"/>", mesh_end = "</mesh>";
+  expectBad(position, position + position, "<input> is the second POSITION");
+  expectBad(mesh_end, mesh_end + "<mesh></mesh>", "<geometry> has several <mesh>");
+  expectBad("</technique_common>", "</technique_common><technique_common/>", "<source> has several <technique_common>");
+  expectBad("</accessor>", "</accessor><accessor/>", "<technique_common> has several <accessor>");
+  for (const std::string lists : {"", "<p>0 1 2</p><p>2 1 3</p>", "<p>0 1 2 2 1 3</p><p>0 1 2 2 1 3</p>"}) {
+    for (const char* count : {" count=\"2\"", "", " count=\"4\""}) {
+      const std::string list = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><vcount>3 3</vcount>" + lists;
+      expectBad(mesh_end, "<polylist" + std::string(count) + ">" + list + "</polylist></mesh>", "a.dae: ");
+    }
+  }
   expectBad("stride=\"3\"", "stride=\"-3\"", "<accessor> has a stride of '-3'");
   for (const char* metres : {"0", "-1", "0,01", "nan"}) {
     expectBad("meter=\"1\"", "meter=\"" + std::string(metres) + "\"", "<unit> has a meter of");
