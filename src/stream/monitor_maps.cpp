@@ -102,6 +102,7 @@ void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBo
     problem << "the octomap has voxels of " << next.surface->resolution() << " m in frame '" << next.frame_id
             << "', and octomap_file of " << sure->resolution() << " m in '" << trusted.frame_id
             << "'; used together they must have the same";
+    own_voxels.missMaps();
     map = ObstacleMap();
     map.problem = problem.str();
     return;
@@ -113,9 +114,9 @@ void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBo
 
 /// From the next step on what was the body's own is an obstacle, as far as the map in force shows it.
 void Monitor::Impl::forgetOwnVoxels(std::size_t body) {
-  if (own_voxels.forgetBody(static_cast<std::uint16_t>(body)) && map.surface) {
-    map = own_voxels.reducedAnew(map, trusted.surface.get(), tracked(), options.own_voxels_trust);
-  }
+  if (!own_voxels.forgetBody(static_cast<std::uint16_t>(body)) || !map.surface) return;
+  const ObstacleMap before = std::exchange(map, ObstacleMap());  // should memory end, there is none until the next one
+  map = own_voxels.reducedAnew(before, trusted.surface.get(), tracked(), options.own_voxels_trust);
 }
 
 /// What is in doubt matters to a step that would touch it, were it an obstacle.

@@ -349,23 +349,25 @@ TEST_F(OwnVoxels, AfterMapsThatWereNotLookedAtNothingIsOwn) {
   EXPECT_FALSE(assuranceOf(outcome).proved);
 }
 
-// Nor after one that was refused, or that waited when such a one came: the obstacle above the sheet was in it before
-// the sheet came near.
+// Nor after one that was refused, that waited when such a one came, or that does not fit octomap_file: the obstacle
+// above the sheet was in it before the sheet came near.
 TEST_F(OwnVoxels, AfterAMapThatWasRefusedNothingIsOwn) {
-  for (const bool waited : {false, true}) {
+  enum Why { REFUSED, WAITED, MISFIT };
+  for (const Why why : {REFUSED, WAITED, MISFIT}) {
     start(0.1);
+    if (why == MISFIT) monitor_->setMapBeside(mapOf(VOXEL_M, {voxelAt(20, 20, 0)}, 0));
     hoverAboveFloor();
-    if (waited) map(150 * MS, slab(1) + voxelsOf(0.85));
+    if (why == WAITED) map(150 * MS, slab(1) + voxelsOf(0.85));
     ObstacleMap refused;
     refused.problem = "a test";
-    if (!waited) monitor_->missMap();
-    monitor_->setMap(refused);
+    if (why == REFUSED) monitor_->missMap();
+    monitor_->setMap(why == MISFIT ? mapOf(0.2, leavesOf(layer(4, 1, 4)), 150 * MS) : refused);
     EXPECT_EQ(feed(200 * MS, 0.78).status, StepStatus::NO_MAP);
     map(250 * MS, slab(1) + voxelsOf(0.85));
     const Outcome outcome = feed(300 * MS, 0.85);
-    EXPECT_EQ(own(outcome), 0u);
-    EXPECT_EQ(doubted(outcome), 25u);
-    EXPECT_FALSE(assuranceOf(outcome).proved);
+    EXPECT_EQ(own(outcome), 0u) << why;
+    EXPECT_EQ(doubted(outcome), 25u) << why;
+    EXPECT_FALSE(assuranceOf(outcome).proved) << why;
   }
   start(0.1);
   hoverAboveFloor();
@@ -376,31 +378,56 @@ TEST_F(OwnVoxels, AfterAMapThatWasRefusedNothingIsOwn) {
 }
 
 // With a map that is sent once there is no next one in which its voxels were obstacles.
-TEST_F(OwnVoxels, OfABodyThatIsRemovedAreObstaclesAtOnce) {
-  Body cup = named("cup");
-  cup.own_voxels_m = 0.05;
-  MonitorOptions options = loose();
-  options.own_voxels_lag_s = 0;
-  monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), cup});
-  const auto feedBoth = [&](StampNs stamp_ns, double cloth_z) {
-    monitor_->push(1, sheet(stamp_ns, 0.55), NOW);
-    return feed(stamp_ns, cloth_z);
-  };
-  feedBoth(0, 0.95);
-  map(0, slab(1));
-  feedBoth(100 * MS, 0.95);
-  map(150 * MS, slab(1) + voxelsOf(0.55));
-  const Outcome held = feedBoth(200 * MS, 0.95);
-  ASSERT_EQ(own(held), 25u);
-  monitor_->setBody(1, named("nothing"));
-  const auto nothing = share(Topology::fromTriangles(0, {}));
-  for (const StampNs stamp_ns : {200 * MS, 300 * MS}) monitor_->push(1, {stamp_ns, nothing, {}}, NOW);
-  const Outcome onto = feed(300 * MS, 0.55);
+class OwnVoxelsOfTwo : public OwnVoxels {
+ protected:
+  /// A cup below the cloth, of which a map shows 25 voxels.
+  void SetUp() override {
+    Body cup = named("cup");
+    cup.own_voxels_m = 0.05;
+    MonitorOptions options = loose();
+    options.detector.obstacle_expected = true;
+    options.own_voxels_lag_s = 0;
+    monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), cup});
+    const auto feedBoth = [&](StampNs stamp_ns) {
+      monitor_->push(1, sheet(stamp_ns, 0.55), NOW);
+      return feed(stamp_ns, 0.95);
+    };
+    feedBoth(0);
+    map(0, slab(1));
+    feedBoth(100 * MS);
+    map(150 * MS, slab(1) + voxelsOf(0.55));
+    ASSERT_EQ(own(feedBoth(200 * MS)), 25u);
+  }
+  void removeCup() { monitor_->setBody(1, named("nothing")); }
+  /// The cloth, onto where the cup was.
+  Outcome feedOntoIt() {
+    const auto nothing = share(Topology::fromTriangles(0, {}));
+    for (const StampNs stamp_ns : {200 * MS, 300 * MS}) monitor_->push(1, {stamp_ns, nothing, {}}, NOW);
+    return feed(300 * MS, 0.55);
+  }
+};
+
+TEST_F(OwnVoxelsOfTwo, OfABodyThatIsRemovedAreObstaclesAtOnce) {
+  removeCup();
+  const Outcome onto = feedOntoIt();
   ASSERT_EQ(onto.status, StepStatus::OK) << onto.reason;
   EXPECT_EQ(own(onto), 0u);
   EXPECT_TRUE(onto.step->map.own.excluded.empty());
   EXPECT_EQ(assuranceOf(onto).touching, Touching::NEW);
   EXPECT_EQ(onto.step->map.surface->leafCount(), 125u) << "the floor and what stood there";
+}
+
+// The removal fails at one allocation after the other, and is tried again: there are the obstacles, or no map.
+TEST_F(OwnVoxelsOfTwo, ARemovalThatFailedLeavesNothingFree) {
+  const int allocations = failingEverywhere([&](int n) {
+    SetUp();
+    const bool met = failsAt(n, false, [&] { removeCup(); });
+    removeCup();
+    const Outcome onto = feedOntoIt();
+    EXPECT_TRUE(assuranceOf(onto).touching == Touching::NEW || onto.status == StepStatus::NO_MAP) << onto.reason;
+    return met;
+  });
+  EXPECT_GE(allocations, 5);
 }
 
 // A map of what is near the sensor alone forgets all else: what is remembered of it must not grow for ever.
