@@ -93,6 +93,8 @@ class DCCD_EXPORT Monitor {
   void setBody(std::size_t body, Body what);
   /// Where the next step begins: the oldest one that waits, or that of the clock body's next frame. 0: not known yet.
   StampNs nextStart() const;
+  /// Where steps begin that wait, and that of the clock body's next frame.
+  std::set<StampNs> starts() const;
 
   /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
   /// again.

@@ -248,8 +248,11 @@ class MonitorPipeline {
   /// stamp of the one that waits. False: it is not known of all.
   bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
   std::vector<SeenPose> lookBack(const std::string& target, const std::string& source) const;
+  std::vector<SeenPose> posesFrom(const std::string& target, const std::string& source, StampNs from_ns,
+                                  StampNs to_ns) const;
   std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                      StampNs to_ns) const;
+  bool mayBeAStep(StampNs from_ns, StampNs to_ns) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.
   bool mapMayCome(std::int64_t now_ns) const;
 };

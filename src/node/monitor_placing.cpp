@@ -288,7 +288,7 @@ bool MonitorPipeline::mapMayCome(std::int64_t now_ns) const {
 bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   bool all_known = true;
   const auto find = [&](const std::string& target, const std::string& source) {
-    std::vector<SeenPose> seen = posesBetween(target, source, clock_ns_ - 1, stamp_ns);  // the last frame's stamp, too
+    std::vector<SeenPose> seen = posesFrom(target, source, clock_ns_, stamp_ns);
     std::string unused;
     SeenPose last{stamp_ns, {}};
     const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
@@ -308,25 +308,43 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
 }
 
 /// Steps that wait for other bodies will be answered with what is held only now, and the next one begins where the
-/// clock body's last frame was.
+/// last of them ends.
 std::vector<SeenPose> MonitorPipeline::lookBack(const std::string& target, const std::string& source) const {
-  if (target == source || clock_ns_ == 0) return {};
   std::vector<SeenPose> seen;
-  if (monitor_->waiting()) {
-    const auto longest_ns = static_cast<StampNs>(config_.monitor.store.max_step_s * 1e9);
-    seen = posesBetween(target, source, clock_ns_ - longest_ns, clock_ns_);
+  if (target == source) return seen;
+  StampNs before_ns = 0;
+  for (const StampNs start_ns : monitor_->starts()) {
+    const std::vector<SeenPose> step = posesFrom(target, source, before_ns, start_ns);
+    seen.insert(seen.end(), step.begin(), step.end());
+    before_ns = start_ns;
   }
-  SeenPose last{clock_ns_, {}};
-  std::string unused;
-  if (transforms_.lookup(target, source, clock_ns_, last.pose, unused)) seen.push_back(last);
+  SeenPose last{before_ns, {}};
+  std::string unused;  // the next frame asks again
+  if (before_ns != 0 && transforms_.lookup(target, source, before_ns, last.pose, unused)) seen.push_back(last);
   return seen;
+}
+
+/// As posesBetween(), and where it was at the first of the two, which may lie between two stamps of tf.
+std::vector<SeenPose> MonitorPipeline::posesFrom(const std::string& target, const std::string& source, StampNs from_ns,
+                                                 StampNs to_ns) const {
+  std::vector<SeenPose> seen = posesBetween(target, source, from_ns, to_ns);
+  if (!mayBeAStep(from_ns, to_ns)) return seen;
+  std::string unused;
+  SeenPose first{from_ns, {}};
+  const bool known = transforms_.lookup(target, source, from_ns, first.pose, unused);
+  seen.push_back(known ? first : unknownAt(from_ns + 1));  // of the step that ends there it may be known
+  return seen;
+}
+
+bool MonitorPipeline::mayBeAStep(StampNs from_ns, StampNs to_ns) const {
+  return from_ns != 0 && from_ns < to_ns && secondsBetween(from_ns, to_ns) <= config_.monitor.store.max_step_s + 1e-6;
 }
 
 /// Target_from_source at each stamp of tf between the two, as far back as a step may reach (from 0: not at all).
 std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, const std::string& source,
                                                     StampNs from_ns, StampNs to_ns) const {
   std::vector<SeenPose> seen;
-  if (from_ns == 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s + 1e-6) return seen;
+  if (!mayBeAStep(from_ns, to_ns)) return seen;
   // What tf saw before that, nobody knows any more.
   if (transforms_.timesForgotten() != times_forgotten_) return {unknownAt(to_ns - 1)};
   const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from_ns, to_ns);

@@ -200,6 +200,67 @@ TEST(Map, WhoseFrameMovedBeforeItCameIsNoClearStep) {
   }
 }
 
+// Where a step begins, between two transforms: the frame before it had another stamp, or its transform came later.
+TEST(Map, ThatIsElsewhereWhereAStepBeginsIsNoClearStep) {
+  for (const bool moves : {false, true}) {
+    Mapped scene;
+    for (const double at : {0.0, 0.2, 0.24}) scene.move("odom", at, -0.5);
+    scene.giveMapIn("odom", 0);
+    const auto moveAround = [&](double at) {
+      scene.move("odom", at - 0.001, moves ? 0.6 : -0.5);
+      scene.move("odom", at + 0.001, -0.5);
+    };
+    moveAround(0.25);
+    for (const double at : {0.3, 0.35}) scene.move("odom", at, -0.5);
+    for (const double at : {0.3, 0.35}) scene.offer(at, 0.05f);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    scene.offer(0.25, 0.05f);
+    EXPECT_EQ(scene.outcome.status, StepStatus::TIME_JUMP);
+    scene.offer(0.3, 0.05f);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), !moves) << "after a jump back: " << scene.outcome.reason;
+    scene.offer(0.35, 0.05f);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    scene.offer(0.4, 0.05f, 0);
+    scene.move("odom", 0.4, -0.5);
+    EXPECT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+
+    Mapped late;
+    for (const double at : {0.0, 0.04}) late.move("odom", at, -0.5);
+    for (const double at : {0.0, 0.05}) late.offer(at, 0.05f);
+    late.giveMapIn("odom", 0.04);
+    late.pipeline.nextOutcome(0, late.outcome);
+    late.move("odom", 0.049, moves ? 0.6 : -0.5);
+    for (const double at : {0.051, 0.1}) late.move("odom", at, -0.5);
+    late.offer(0.1, 0.05f);
+    EXPECT_EQ(late.outcome.status == StepStatus::OK, !moves) << late.outcome.reason;
+    EXPECT_EQ(assuranceOf(late.outcome).clear(), !moves) << "after a map that came before it: " << late.outcome.reason;
+  }
+}
+
+// The map comes when several steps wait, together longer than a step may be: it is asked where it was in each of them.
+TEST(Map, ThatComesLateIsLookedAtInAllStepsThatWait) {
+  for (const int off : {-1, 0, 1, 3}) {  // between two transforms, before the step's begin; or the last one of all
+    Mapped scene(
+        test::scene("max_step_s: 0.08, sync_timeout_s: 1.0, clock_body: cloth, bodies: {cloth: {topic: cloth}, "
+                    "other: {topic: other}}"));
+    for (int i = 0; i <= 4; ++i) {
+      scene.move("odom", 0.05 * i - 0.001, i == off ? 0.6 : -0.5);
+      scene.move("odom", 0.05 * i + 0.001, -0.5);
+    }
+    for (int i = 0; i <= 4; ++i) scene.offer(0.05 * i, 0.05f);
+    EXPECT_EQ(scene.outcome.status, StepStatus::FIRST_FRAME);
+    scene.giveMapIn("odom", 0.21);
+    scene.move("odom", 0.25, -0.5);
+    for (int i = 0; i <= 4; ++i) {
+      scene.take(1, cloudAt(after(0.05 * i), 1));
+      ASSERT_EQ(scene.pipeline.nextOutcome(0, scene.outcome), i > 0);
+      if (i == 0) continue;
+      EXPECT_EQ(assuranceOf(scene.outcome).clear(), off != i && off != i - 1)
+          << off << " " << i << ": " << scene.outcome.reason;
+    }
+  }
+}
+
 // A map of another frame comes while a step waits that is before its stamp.
 TEST(Map, ThatMovesIsSeenAlsoWhereTheNextMapHasAnotherFrame) {
   Mapped scene(
