@@ -203,15 +203,14 @@ void Monitor::setBody(std::size_t body, Body what) {
   bodies.resize(std::max(bodies.size(), body + 1));
   bodies[body] = std::move(what);
   check(m.options.detector, bodies);
-  if (bodies.size() > m.bodies.size()) {
-    m.stores.emplace_back(m.options.store);
-    m.counters.emplace_back();
-    m.runs.push_back(0);
-    m.told_runs.push_back(0);
-    m.references.frames.emplace_back();
-    m.references.topologies.emplace_back();
-    m.held_seen.emplace_back();
-  }
+  // Should memory end before, there is no body of the new ones.
+  m.counters.resize(bodies.size());
+  m.runs.resize(bodies.size());
+  m.told_runs.resize(bodies.size());
+  m.references.frames.resize(bodies.size());
+  m.references.topologies.resize(bodies.size());
+  m.held_seen.resize(bodies.size());
+  m.stores.resize(bodies.size(), MeshStore(m.options.store));
   m.bodies = std::move(bodies);
   m.stores[body].clear();
   m.told_runs[body] = 0;

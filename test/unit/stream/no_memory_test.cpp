@@ -174,6 +174,25 @@ TEST(NoMemory, AFrameThatIsNotKeptTakesNoRoomInTheStore) {
   }
 }
 
+TEST(NoMemory, ABodyForWhichThereIsNoRoomIsNotHalfThere) {
+  Cloths whole;
+  whole.feed(0);
+  const Outcome expected = whole.feed(1);
+  const int allocations = failingEverywhere([&](int n) {
+    Cloths cloths;
+    Body third;
+    third.name = "third";
+    const bool met = failsAt(n, false, [&] { cloths.monitor().setBody(2, third); });
+    EXPECT_EQ(cloths.monitor().bodies().size(), met ? 2u : 3u);
+    cloths.monitor().reset();
+    if (!met) return met;
+    cloths.feed(0);
+    expectSame(cloths.feed(1), expected);
+    return met;
+  });
+  EXPECT_GT(allocations, 5);
+}
+
 /// Of the clock body a start, steps of which the first ones find no room to wait, a gap, and a jump back.
 TEST(NoMemory, EveryFrameThatIsPushedEndsInACount) {
   const auto topology = grid(6, 8);
