@@ -59,7 +59,7 @@ XmlRpcValue plates() {
 
 class World {
  public:
-  explicit World(std::uint64_t seed) : random_(seed), driven_(plates()) {
+  explicit World(std::uint64_t seed) : random_(seed), tf_off_ns_(seed % 10 * MS), driven_(plates()) {
     for (std::size_t b = 0; b < driven_.config.bodies.size(); ++b) body_[driven_.config.bodies[b].body.name] = b;
   }
 
@@ -76,6 +76,7 @@ class World {
 
  private:
   std::mt19937_64 random_;
+  const StampNs tf_off_ns_;  // from the frames' stamps
   Driven driven_;
   std::map<std::string, std::size_t> body_;
   std::map<std::string, Track> tracks_;
@@ -121,13 +122,13 @@ class World {
 
   /// All that comes up to the cloth's frame of this time, and that frame.
   void tick(StampNs now) {
-    for (StampNs t = now - TICK + 10 * MS; t <= now; t += 10 * MS) {
+    for (StampNs t = now - TICK + 10 * MS + tf_off_ns_; t <= now + tf_off_ns_; t += 10 * MS) {
       // Between two frames of the cloth things may go through it and back.
       const bool dips = t < now && chance(60), slides = chance(60), shifts = chance(200);
       if (slides) finger_ = level();
       if (shifts) odom_ = odom_ < 0 ? -1.5 : -1;
       transformTo("finger", t, dips ? level() : finger_);
-      transformTo("odom", t, chance(150) ? 0.5 : odom_);  // also at a frame's stamp
+      transformTo("odom", t, chance(25) ? 0.5 : odom_);  // also at a frame's stamp
     }
     if (chance(8)) {  // the stamps go back, and where it is now nobody saw it go
       other_ = level();
@@ -157,6 +158,12 @@ class World {
       giveMap(now);
     }
     if (chance(10)) driven_.pipeline.setPhase(driven_.config.phases().at(random_() % 2));
+    if (chance(8)) {
+      const StampNs back = now - TICK - static_cast<StampNs>(random_() % 5) * 10 * MS;
+      say("other", back, other_);
+      say("cloth", back, cloth_);
+      say("other", now, other_);
+    }
     if (chance(25)) cloth_ = level() / 4;
     if (chance(25)) {
       send("cloth", now, 0, true);
