@@ -358,7 +358,7 @@ TEST_F(OwnVoxels, AfterAMapThatWasRefusedNothingIsOwn) {
     if (waited) map(150 * MS, slab(1) + voxelsOf(0.85));
     ObstacleMap refused;
     refused.problem = "a test";
-    if (!waited) monitor_->missMap();
+    if (!waited) refused.missed = refused.problem;
     monitor_->setMap(refused);
     EXPECT_EQ(feed(200 * MS, 0.78).status, StepStatus::NO_MAP);
     map(250 * MS, slab(1) + voxelsOf(0.85));
