@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "dccd/export.h"
@@ -20,6 +21,7 @@ namespace dccd {
 struct SeenPose {
   StampNs stamp_ns = 0;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< not finite: nobody knows
+  std::string why_unknown = {};                            ///< in words
 };
 
 /// One frame, already in the fixed frame.

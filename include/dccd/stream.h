@@ -93,19 +93,15 @@ class DCCD_EXPORT Monitor {
   void setBody(std::size_t body, Body what);
   /// Where the next step begins: the oldest one that waits, or that of the clock body's next frame. 0: not known yet.
   StampNs nextStart() const;
-  /// Where steps begin that wait, and that of the clock body's next frame.
-  std::set<StampNs> starts() const;
 
   /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
   /// again.
   void withdraw(std::size_t body);
 
   /// The map from the next step on whose end is not before its stamp, where bodies have own voxels; else from the next
-  /// step on. Of one that is trusted nothing is a body's own.
+  /// step on. Of one that is trusted nothing is a body's own. After maps that nobody looked at, which ObstacleMap::missed
+  /// says, what is own by the next one is in doubt: it may be an obstacle that those showed.
   void setMap(ObstacleMap map);
-  /// A map came that nobody looked at, before the next one that setMap() is given: what is own by the newer one may be
-  /// an obstacle that this one showed.
-  void missMap();
   /// What is occupied besides, from the next map on: it is trusted, and has the frame and resolution of the others.
   void setMapBeside(ObstacleMap map);
   const ObstacleMap& map() const;       ///< as it was given last

@@ -13,7 +13,7 @@
 
 namespace dccd {
 
-/// Aligned for vector loads. What does not fill a huge page stays in small ones: no page holds more than the array.
+/// Aligned for vector loads. Huge pages are asked for where the array fills them, so that they take no more memory.
 template <class T>
 hwy::AlignedFreeUniquePtr<T[]> makeLarge(std::size_t n) {
   const auto allocate = [](void*, std::size_t bytes) -> void* {

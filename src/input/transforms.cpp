@@ -86,6 +86,7 @@ bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform,
   const auto old =
       frame.sent.lower_bound(frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
   const std::size_t before = frame.sent.size();
+  frame.is_cut = frame.is_cut || old != frame.sent.begin();
   frame.sent.erase(frame.sent.begin(), old);
   kept_count_ += 1 + frame.sent.size() - before;
   return false;
@@ -94,7 +95,10 @@ bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform,
 /// Keeps static transforms.
 void TransformFeed::clear() {
   buffer_.clear();
-  for (auto& named : frames_) named.second.sent.clear();
+  for (auto& named : frames_) {
+    named.second.sent.clear();
+    named.second.is_cut = false;
+  }
   kept_count_ = 0;
   ++times_forgotten_;
 }
@@ -176,6 +180,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
       continue;
     }
     if (is_static) {
+      if (frame->fixed.parent && !isThere(*frame, sent)) ++times_forgotten_;
       frame->fixed = sent;
     } else {
       if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
@@ -204,9 +209,9 @@ void TransformFeed::dispute(const geometry_msgs::TransformStamped& transform, Fr
   leaveOut(transform, "it is on /tf and, elsewhere, on /tf_static; stop one of the two and start the monitor anew");
 }
 
-/// On the way as it is now; null: none.
-const TransformFeed::Frame* TransformFeed::disputedBetween(const std::string& target, const std::string& source) const {
-  if (!has_disputed_ || !findWay(target, source, newestParentOf)) return nullptr;
+/// On the way that was found last; null: none.
+const TransformFeed::Frame* TransformFeed::disputedOnWay() const {
+  if (!has_disputed_) return nullptr;
   for (const Chain* chain : {&from_target_, &from_source_}) {
     const auto end = std::prev(chain->end());
     const auto found = std::find_if(chain->begin(), end, [](const Frame* frame) { return frame->is_disputed; });
@@ -244,6 +249,23 @@ const TransformFeed::Frame* TransformFeed::newestParentOf(const Frame& frame) {
   return frame.sent.empty() ? frame.fixed.parent : frame.sent.rbegin()->second.parent;
 }
 
+/// The first of one that moves after the stamp. Most of the time that is none, or one of the newest.
+std::map<StampNs, TransformFeed::Sent>::const_iterator TransformFeed::after(const Frame& frame, StampNs stamp_ns) {
+  auto found = frame.sent.end();
+  for (int newest = 0; newest < 4 && found != frame.sent.begin(); ++newest) {
+    if (std::prev(found)->first <= stamp_ns) return found;
+    --found;
+  }
+  return frame.sent.upper_bound(stamp_ns);
+}
+
+/// As tf2 takes it between two stamps with other parents: the one before. Of what it does not know, the nearest.
+const TransformFeed::Frame* TransformFeed::parentAt(const Frame& frame, StampNs stamp_ns) {
+  if (frame.sent.empty()) return frame.fixed.parent;
+  const auto next = after(frame, stamp_ns);
+  return (next == frame.sent.begin() ? next : std::prev(next))->second.parent;
+}
+
 /// Both chains, up to where the two meet. False: they do not.
 template <class ParentOf>
 bool TransformFeed::findWay(const std::string& target, const std::string& source, ParentOf parentOf) const {
@@ -279,13 +301,16 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
   if (target == source) return true;
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    if (const Frame* const frame = disputedBetween(target, source)) {
-      reason = "'" + shortText(frame->name, MAX_NAME) + "' is on /tf and, elsewhere, on /tf_static";
-      return false;
-    }
+    const auto isDisputed = [&] {
+      const Frame* const frame = disputedOnWay();
+      if (frame) reason = "'" + shortText(frame->name, MAX_NAME) + "' is on /tf and, elsewhere, on /tf_static";
+      return frame != nullptr;
+    };
+    if (has_disputed_ && findWay(target, source, newestParentOf) && isDisputed()) return false;
     Pose of_target, of_source;
     // The newest common transform is tf2's to find, and so is the reason why there is none.
     if (stamp_ns > 0 && findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
+      if (isDisputed()) return false;
       of_target = poseAlong(from_target_);
       of_source = poseAlong(from_source_);
     } else {
@@ -308,11 +333,9 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
   }
 }
 
-/// With those that are kept of each frame on the way, as it is now.
+/// With each frame that moves on the way that was found last.
 template <class Take>
-void TransformFeed::forEachKept(const std::string& target, const std::string& source, Take take) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (!findWay(target, source, newestParentOf)) return;
+void TransformFeed::forEachKeptOnWay(Take take) const {
   for (const Chain* chain : {&from_target_, &from_source_}) {
     for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
       if (!(*chain)[i]->sent.empty()) take(*(*chain)[i]);
@@ -321,26 +344,47 @@ void TransformFeed::forEachKept(const std::string& target, const std::string& so
 }
 
 std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
-                                                  StampNs to_ns) const {
+                                                  StampNs to_ns, std::vector<NewParent>& changes) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<StampNs> stamps;
-  const std::tuple question(change_, from_ns, to_ns);
-  forEachKept(target, source, [&](const Frame& frame) {
-    if (frame.none_between == question) return;
-    const std::size_t before = stamps.size();
-    // From the newest one back: what is asked for lies there.
-    for (auto it = frame.sent.rbegin(); it != frame.sent.rend() && it->first > from_ns; ++it) {
-      if (it->first < to_ns) stamps.push_back(it->first);
-    }
-    if (stamps.size() == before) frame.none_between = question;
-  });
+  // The way at the end, then the one that was there before its last change, and so on.
+  for (StampNs end_ns = to_ns; end_ns > from_ns;) {
+    if (!findWay(target, source, [&](const Frame& frame) { return parentAt(frame, end_ns); })) break;
+    const std::tuple question(change_, from_ns, end_ns);
+    NewParent last{from_ns, nullptr, nullptr, nullptr};
+    forEachKeptOnWay([&](const Frame& frame) {
+      if (frame.none_between == question) return;
+      const std::size_t found_before = stamps.size();
+      const Frame *const parent = parentAt(frame, end_ns), *before = nullptr;
+      StampNs since_ns = from_ns;
+      auto one = after(frame, end_ns);
+      while (one != frame.sent.begin()) {
+        --one;
+        before = one->second.parent;
+        if (before != parent) break;
+        since_ns = one->first;
+        if (since_ns <= from_ns) break;
+        if (since_ns < to_ns) stamps.push_back(since_ns);
+      }
+      const bool has_all = since_ns <= from_ns || (before == parent && !frame.is_cut);
+      if (has_all && stamps.size() == found_before) frame.none_between = question;
+      if (has_all || since_ns <= last.stamp_ns) return;
+      last = {since_ns, &frame.name, before == parent ? nullptr : &before->name, &parent->name};
+    });
+    if (!last.frame) break;
+    changes.push_back(last);
+    end_ns = last.stamp_ns - 1;
+  }
   std::sort(stamps.begin(), stamps.end());
   stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
   return stamps;
 }
 
 std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, const std::string& source) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
   std::optional<StampNs> first;
-  forEachKept(target, source, [&](const Frame& frame) {
+  if (!findWay(target, source, newestParentOf)) return first;
+  forEachKeptOnWay([&](const Frame& frame) {
     first = std::max(first.value_or(frame.sent.begin()->first), frame.sent.begin()->first);
   });
   return first;

@@ -26,7 +26,8 @@ constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 /// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
 /// the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that was elsewhere
 /// at a stamp before its newest tells it, as after a simulation's reset. A frame that is on /tf and, elsewhere, on
-/// /tf_static has no place: tf2 would have it at rest where it was sent last, at all times. Leaves out what tf2 would
+/// /tf_static has no place: tf2 would have it at rest where it was sent last, at all times. One that is sent elsewhere
+/// on /tf_static is there at all times from then on, and where it was before is forgotten. Leaves out what tf2 would
 /// write a line to the console for, each time: repeated stamps above all. Any thread may call it.
 class TransformFeed {
  public:
@@ -51,13 +52,21 @@ class TransformFeed {
   /// one once that is there, and give other last bits.
   bool lookup(const std::string& target, const std::string& source, StampNs stamp_ns, Eigen::Isometry3d& transform,
               std::string& reason) const;
-  /// Ascending: between the two, neither included, each stamp of a transform that target_from_source is made of.
+  /// From the stamp on a frame had this parent. Before that it had another one, or, where that is null, what was sent
+  /// is not kept any more. The names stay.
+  struct NewParent {
+    StampNs stamp_ns;
+    const std::string *frame, *before, *now;
+  };
+  /// Ascending: between the two, neither included, each stamp of a transform that target_from_source is made of then.
+  /// Added to `changes`, newest first: from when on, after from_ns and up to to_ns, it was made of other frames than
+  /// before. Where tf2 has it just before that nobody said.
   std::vector<StampNs> stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
-                                     StampNs to_ns) const;
+                                     StampNs to_ns, std::vector<NewParent>& changes) const;
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
   std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
 
-  /// How often what was sent before was forgotten.
+  /// How often where frames were before was forgotten.
   std::uint64_t timesForgotten() const { return times_forgotten_; }
   /// How many transforms could not be used.
   std::uint64_t unusable() const { return unusable_; }
@@ -85,6 +94,7 @@ class TransformFeed {
     std::optional<bool> is_static;  ///< as tf2 takes it, for good, from what came first; none: it is a parent alone
     std::map<StampNs, Sent> sent;   ///< of one that moves
     Sent fixed;                     ///< of one that is static
+    bool is_cut = false;            ///< older ones were sent
     bool is_disputed = false;       ///< it is on both topics, and not at one place
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;
@@ -112,8 +122,10 @@ class TransformFeed {
   bool goesBack(const geometry_msgs::TransformStamped& transform) const;
   static bool isThere(const Frame& frame, const Sent& sent);
   void dispute(const geometry_msgs::TransformStamped& transform, Frame& frame);
-  const Frame* disputedBetween(const std::string& target, const std::string& source) const;
+  const Frame* disputedOnWay() const;
   static const Frame* newestParentOf(const Frame& frame);
+  static std::map<StampNs, Sent>::const_iterator after(const Frame& frame, StampNs stamp_ns);
+  static const Frame* parentAt(const Frame& frame, StampNs stamp_ns);
   bool isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame);
   void clear();
   void leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem);
@@ -123,7 +135,7 @@ class TransformFeed {
   static Pose poseOf(const geometry_msgs::Transform& transform);
   static Pose poseAlong(const Chain& chain);
   template <class Take>
-  void forEachKept(const std::string& target, const std::string& source, Take take) const;
+  void forEachKeptOnWay(Take take) const;
 };
 
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions);

@@ -122,6 +122,7 @@ struct BagReplay::Run {
 
   void setMap(LoadedMap map, std::int64_t now_ns) {
     ++summary.maps;
+    map.arrival_ns = now_ns;
     if (map.surface && variation.voxels > 1) map.surface = coarser(*map.surface, variation.voxels);
     if (!map.surface) {
       ++summary.maps_refused;

@@ -40,10 +40,12 @@ LoadedMap CloudMapping::add(const std::vector<std::uint8_t>& bytes, StampNs rece
                             const std::function<bool()>& may_wait, const VoxelSurface* before) {
   LoadedMap map;
   map.frame_id = frame_;
+  bool is_in = false;
   loadMap(config_, &memory_, before, map, [&](const OctomapLimits& limits) {
     Vec3 sensor;
     const Positions points = place(bytes, receipt_ns, may_wait, map, sensor);
     if (!map_) map_.emplace(config_.cloud_map);
+    is_in = true;  // be it in part
     try {
       map_->insert(sensor, points, cloudMemory(config_));
     } catch (const OctomapError& error) {
@@ -53,6 +55,7 @@ LoadedMap CloudMapping::add(const std::vector<std::uint8_t>& bytes, StampNs rece
     }
     return map_->leaves(limits);
   });
+  if (!map.surface && is_in) map.missed = "one was refused: " + map.problem;
   return map;
 }
 

@@ -25,9 +25,9 @@ class CloudMapping {
   bool hasFrame() const { return !frame_.empty(); }
 
   /// A serialised cloud (PointCloud2) becomes part of the map, which it returns; never throws: what is wrong is in
-  /// LoadedMap::problem. `may_wait` is asked again and again while there is no transform at the cloud's stamp (without
-  /// one: at its receipt); it says whether to go on, and takes its time. hasFrame() must hold.
-  /// `before`: as decodeMapMessage()'s.
+  /// LoadedMap::problem; where the next map will show the cloud all the same, in LoadedMap::missed, too. `may_wait` is
+  /// asked again and again while there is no transform at the cloud's stamp (without one: at its receipt); it says
+  /// whether to go on, and takes its time. hasFrame() must hold. `before`: as decodeMapMessage()'s.
   LoadedMap add(const std::vector<std::uint8_t>& bytes, StampNs receipt_ns, const std::function<bool()>& may_wait,
                 const VoxelSurface* before = nullptr);
 

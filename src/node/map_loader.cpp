@@ -37,7 +37,8 @@ void MapLoader::put(Job job) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!isBusy()) busy_since_ns_ = job.arrival_ns;
-    job.after_missed = job_ && !config_.takesClouds();  // a cloud that was left out is in no map
+    // A cloud that was left out is in no map.
+    if (job_ && !config_.takesClouds()) job.missed = "they come faster than the node decodes them; send fewer";
     job_ = std::move(job);
   }
   changed_.notify_one();
@@ -97,7 +98,7 @@ std::optional<std::int64_t> MapLoader::busySince() {
 void MapLoader::keep(LoadedMap map) {
   const bool is_small = !map.surface || map.surface->memoryBytes() <= config_.max_map_bytes / SHARE_OF_FINISHED;
   const std::size_t most = config_.ownsVoxels() && is_small ? MOST_FINISHED : 1;
-  for (; done_.size() >= most; done_.pop_back()) map.after_missed = true;
+  for (; done_.size() >= most; done_.pop_back()) map.missed = "they come faster than steps take them; send fewer";
   done_.push_back(std::move(map));
 }
 
@@ -115,7 +116,7 @@ void MapLoader::loop() {
     LoadedMap map = load(job);
     map.arrival_ns = job.arrival_ns;
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
-    map.after_missed = job.after_missed;
+    if (!job.missed.empty()) map.missed = job.missed;
     if (!map.surface) ++refused_;
     last_ = map.surface;
     {

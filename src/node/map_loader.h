@@ -67,7 +67,7 @@ class MapLoader {
     StampNs receipt_ns = 0;
     std::int64_t arrival_ns = 0;
     std::string problem;  // not empty: refused
-    bool after_missed = false;
+    std::string missed;   // why those before it were decoded by nobody; empty: each was
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
   const MapMemory memory_{config_};

@@ -159,16 +159,13 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
     trusted_map_ = std::move(map);
     return;
   }
-  // What is own follows from each map, not from the newest alone.
-  if (config_.ownsVoxels()) placeMap(now_ns);
-  if (!unplaced_map_) unplaced_since_ns_ = now_ns;
-  map.after_missed = map.after_missed || unplaced_map_;
-  unplaced_map_ = std::move(map);
+  unplaced_maps_.push_back({std::move(map), now_ns});
+  limitUnplacedMaps();
 }
 
 bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (MonitorOptions options = monitor_->options(); effects_.decide(options)) monitor_->setOptions(options);
-  placeMap(now_ns);
+  placeMaps(now_ns);
   // Static bodies first: the clock body's frame is a step, which is to find them where they are.
   for (const bool statics : {true, false}) {
     for (std::size_t b = 0; b < waiting_.size(); ++b) {
@@ -186,6 +183,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);
   nameUnwatched(outcome);
+  nameNewerMap(outcome);
   measureUnknown(outcome);
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
@@ -208,7 +206,7 @@ StatsContext MonitorPipeline::counters() const {
 }
 
 bool MonitorPipeline::waiting() const {
-  if (unplaced_map_ || monitor_->waiting()) return true;
+  if (!unplaced_maps_.empty() || monitor_->waiting()) return true;
   for (const auto& one : waiting_) {
     if (one) return true;
   }

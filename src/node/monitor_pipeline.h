@@ -2,6 +2,7 @@
 // The node drives it with a steady clock, analyze_bag with the bag's; there is no other difference between the two.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -23,17 +24,9 @@
 
 namespace dccd {
 
-/// A decoded map in its own frame.
-struct LoadedMap {
-  std::shared_ptr<const VoxelSurface> surface;  ///< null: `problem` says why
-  std::shared_ptr<const KnownSpace> known;      ///< when unknown_space is not free, or bodies have own voxels
-  std::string frame_id;                         ///< empty: the fixed frame
-  StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
-  std::int64_t arrival_ns = 0;                  ///< by the clock that frames' are of
-  std::string problem;
-  bool trusted = false;       ///< octomap_file: nothing of it is a body's own, and it is used together with a live one
-  bool after_missed = false;  ///< maps came before it that the pipeline was not given
-};
+/// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
+/// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
+using LoadedMap = ObstacleMap;
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
 /// are those of the frame, in its own frame of reference.
@@ -173,13 +166,20 @@ class MonitorPipeline {
   std::vector<std::string> complaints_, hints_, remarks_;
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
-  std::optional<LoadedMap> unplaced_map_;
-  std::optional<LoadedMap> trusted_map_;  // beside live ones
+  struct UnplacedMap {
+    LoadedMap map;
+    std::int64_t since_ns = 0;
+  };
+  std::deque<UnplacedMap> unplaced_maps_;  // oldest first
+  std::optional<LoadedMap> trusted_map_;   // beside live ones
   bool trusted_placed_ = false;
-  std::int64_t unplaced_since_ns_ = 0, settled_map_ns_ = 0;
+  std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
   std::string map_note_;
-  StampNs clock_ns_ = 0;               // of the clock body's last frame that was placed; 0: none
-  std::uint64_t times_forgotten_ = 0;  // by tf, when that one was placed
+  struct ClockFrame {
+    StampNs stamp_ns;
+    std::uint64_t times_forgotten;  // by tf, when it was placed
+  };
+  std::deque<ClockFrame> clock_frames_;  // of the clock body that were placed: the last one, and those steps wait for
   std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;
@@ -229,8 +229,9 @@ class MonitorPipeline {
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one. Once it is
   /// overdue, links of a robot that have no transform stand in nobody's way any longer.
   bool placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
-  /// Where it is at the stamp, and was since another one. False: nobody knows.
-  bool placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame, std::string& reason) const;
+  /// Where it is at the stamp, and was since a frame of the clock body (null: nobody asks). False: nobody knows.
+  bool placeOne(const Rigid& rigid, const ClockFrame* since, StampNs stamp_ns, MeshFrame& frame,
+                std::string& reason) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
   /// A body is another one from the next step on.
   void setBody(std::size_t body, const Body& what, Rigid rigid);
@@ -238,7 +239,12 @@ class MonitorPipeline {
   void expectNow(const std::string& phase);
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
-  void placeMap(std::int64_t now_ns);
+  /// What the monitor is to have of it: the map in its place, or why there is none. False: no place yet.
+  bool settleMap(const LoadedMap& loaded, bool may_place, ObstacleMap& map, std::string& reason);
+  void placeMaps(std::int64_t now_ns);
+  void limitUnplacedMaps();
+  /// Says of a step with a map that one which came before its frame has no place yet.
+  void nameNewerMap(Outcome& outcome) const;
   /// Poses that were seen, of static bodies by number, and of maps by their frames.
   struct SeenPoses {
     std::map<std::size_t, std::vector<SeenPose>> bodies;
@@ -248,13 +254,17 @@ class MonitorPipeline {
   /// stamp of the one that waits. False: it is not known of all.
   bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
   std::vector<SeenPose> lookBack(const std::string& target, const std::string& source) const;
-  std::vector<SeenPose> posesFrom(const std::string& target, const std::string& source, StampNs from_ns,
-                                  StampNs to_ns) const;
-  std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, StampNs from_ns,
+  /// Between a frame of the clock body and a stamp.
+  std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, const ClockFrame& from,
                                      StampNs to_ns) const;
+  std::vector<SeenPose> posesFrom(const std::string& target, const std::string& source, const ClockFrame& from,
+                                  StampNs to_ns) const;
   bool mayBeAStep(StampNs from_ns, StampNs to_ns) const;
-  /// A map came before the clock body's frame and has no place yet, but may find one soon.
-  bool mapMayCome(std::int64_t now_ns) const;
+  void keepClockFrame(const ClockFrame& frame);
+  /// Of the clock body's last frame that was placed; 0: none.
+  StampNs clockNs() const { return clock_frames_.empty() ? 0 : clock_frames_.back().stamp_ns; }
+  /// A map came before a frame of that arrival and has no place yet, but may find one soon.
+  bool mapMayCome(std::int64_t arrival_ns, std::int64_t now_ns) const;
 };
 
 }  // namespace dccd

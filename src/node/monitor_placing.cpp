@@ -1,11 +1,15 @@
 // Where things are: frames, rigid bodies and the map wait for their transforms and are moved into the fixed frame,
 // which may be learnt, and learnt anew.
+#include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <sstream>
 #include <utility>
 
+#include "input/short_text.h"
 #include "input/transforms.h"
 #include "node/monitor_pipeline.h"
 
@@ -13,10 +17,35 @@ namespace dccd {
 
 namespace {
 
-SeenPose unknownAt(StampNs stamp_ns) {
-  SeenPose seen{stamp_ns, Eigen::Isometry3d::Identity()};
+// As long as tf lags behind maps: a second and a half of a camera's. They take a share of max_map_mb at the most, so
+// that there is room for what follows.
+constexpr std::size_t MOST_UNPLACED = 16, SHARE_OF_UNPLACED = 8;
+
+SeenPose unknownAt(StampNs stamp_ns, std::string why) {
+  SeenPose seen{stamp_ns, Eigen::Isometry3d::Identity(), std::move(why)};
   seen.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
   return seen;
+}
+
+std::string secondsOf(StampNs stamp_ns) {
+  std::ostringstream text;
+  text << stamp_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << stamp_ns % 1'000'000'000 << " s";
+  return text.str();
+}
+
+std::string noTransformAt(StampNs stamp_ns) { return "no transform of its frame at " + secondsOf(stamp_ns); }
+
+/// How tf has it before the change is as good as unknown: what carried the frame until then may have gone anywhere
+/// after it was last sent.
+SeenPose unknownBefore(const TransformFeed::NewParent& change) {
+  const std::string name = "'" + shortText(*change.frame, MAX_NAME) + "'";
+  if (!change.before) {
+    return unknownAt(change.stamp_ns - 1,
+                     "tf keeps nothing of frame " + name + " before " + secondsOf(change.stamp_ns));
+  }
+  return unknownAt(change.stamp_ns - 1, "frame " + name + " changed its parent from '" +
+                                            shortText(*change.before, MAX_NAME) + "' to '" +
+                                            shortText(*change.now, MAX_NAME) + "' at " + secondsOf(change.stamp_ns));
 }
 
 ObstacleMap noMap(std::string why) {
@@ -27,7 +56,7 @@ ObstacleMap noMap(std::string why) {
 
 }  // namespace
 
-bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame,
+bool MonitorPipeline::placeOne(const Rigid& rigid, const ClockFrame* since, StampNs stamp_ns, MeshFrame& frame,
                                std::string& reason) const {
   frame = rigid.mesh;
   frame.stamp_ns = stamp_ns;
@@ -36,14 +65,14 @@ bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs from_ns, StampNs stam
     // It stays where it was, and all of it is unknown there: unchecked.
     frame.pose = rigid.pose.value_or(Eigen::Isometry3d::Identity());
     frame.positions.assign(rigid.reference.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-    frame.seen.assign(1, unknownAt(stamp_ns - 1));
+    frame.seen.assign(1, unknownAt(stamp_ns - 1, noTransformAt(stamp_ns)));
     reason = transforms_.noTransform(rigid.frame, "'" + fixed_frame_ + "'", reason) + "; body '" + rigid.name +
              "' is carried by it";
     return false;
   }
   frame.pose = frame.pose * rigid.frame_from_mesh;
   frame.positions = transformed(frame.pose, rigid.reference);
-  frame.seen = posesBetween(fixed_frame_, rigid.frame, from_ns, stamp_ns);
+  if (since) frame.seen = posesBetween(fixed_frame_, rigid.frame, *since, stamp_ns);
   for (SeenPose& seen : frame.seen) seen.pose = seen.pose * rigid.frame_from_mesh;
   return true;
 }
@@ -53,7 +82,7 @@ void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::st
   Rigid& rigid = *rigid_[body];
   if (lost.empty()) {
     // It was lost at the start of the step that ends here.
-    if (rigid.lost) frame.seen.push_back(unknownAt(frame.stamp_ns - 1));
+    if (rigid.lost) frame.seen.push_back(unknownAt(frame.stamp_ns - 1, "no transform of its frame where it begins"));
     rigid.pose = frame.pose;
   } else if (!rigid.lost && body < complaints_.size()) {
     complaints_[body] = "not watched meanwhile: " + lost;
@@ -80,7 +109,7 @@ bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus&
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
     Placed& one = all.emplace_back(Placed{b, {}, {}});
-    if (!placeOne(*rigid_[b], clock_ns_, stamp_ns, one.frame, reason)) {
+    if (!placeOne(*rigid_[b], clock_frames_.empty() ? nullptr : &clock_frames_.back(), stamp_ns, one.frame, reason)) {
       if (!overdue || !rigid_[b]->may_be_lost) return false;
       one.lost = reason;
     }
@@ -95,14 +124,15 @@ void MonitorPipeline::setBody(std::size_t body, const Body& what, Rigid rigid) {
   rigid_.resize(std::max(rigid_.size(), body + 1));
   rigid_[body] = std::move(rigid);
   // Where steps to come begin, so that the next one is answered with it.
-  StampNs before_ns = 0;
-  for (const StampNs stamp_ns : {monitor_->nextStart(), clock_ns_}) {
-    if (monitor_->nextStart() == 0 || stamp_ns <= before_ns) continue;
+  const StampNs start_ns = monitor_->nextStart();
+  const ClockFrame* before = nullptr;
+  for (const ClockFrame& at : clock_frames_) {
+    if (start_ns == 0 || at.stamp_ns < start_ns) continue;
     MeshFrame frame;
     std::string reason;
-    const bool placed = placeOne(*rigid_[body], before_ns, stamp_ns, frame, reason);
+    const bool placed = placeOne(*rigid_[body], before, at.stamp_ns, frame, reason);
     pushRigid(body, std::move(frame), placed ? "" : reason, 0);
-    before_ns = stamp_ns;
+    before = &at;
   }
 }
 
@@ -167,7 +197,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
                                                                      waiting.mesh.stamp_ns, fixed_from_mesh, reason);
   SeenPoses held;
   if (is_clock && has_place) {
-    if (mapMayCome(now_ns)) return false;
+    if (mapMayCome(waiting.mesh.arrival_ns, now_ns)) return false;
     // In time for a step that says so, if it does not come.
     if (!findHeld(waiting.mesh.stamp_ns, held) && !overdue) return false;
   }
@@ -198,8 +228,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   }
   transform(fixed_from_mesh, done.mesh.positions);
   if (is_clock) {
-    clock_ns_ = done.mesh.stamp_ns;
-    times_forgotten_ = times_forgotten;
+    keepClockFrame({done.mesh.stamp_ns, times_forgotten});
     for (const auto& [number, poses] : held.bodies) monitor_->seen(number, poses);
     for (const auto& [frame, poses] : held.maps) monitor_->mapSeen(frame, poses);
   }
@@ -212,11 +241,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
 /// The map in the fixed frame, by the transform at its stamp.
 bool MonitorPipeline::findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason) {
   const std::string frame = loaded.frame_id.empty() ? fixed_frame_ : loaded.frame_id;
-  map.surface = loaded.surface;
-  map.stamp_ns = loaded.stamp_ns;
-  map.arrival_ns = loaded.arrival_ns;
-  map.known = loaded.known;
-  map.trusted = loaded.trusted;
+  map = loaded;
   map.frame_id = frame;
   if (transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) return true;
   // A latched map is older than all of tf that a monitor hears that starts later.
@@ -241,58 +266,105 @@ bool MonitorPipeline::placeTrusted(std::int64_t now_ns) {
   trusted_placed_ = findPlace(*trusted_map_, map, reason);
   if (trusted_placed_) {
     monitor_->setMapBeside(std::move(map));
-  } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
+  } else if (finishing_ || secondsBetween(unplaced_maps_.front().since_ns, now_ns) >= config_.transform_timeout_s) {
     monitor_->setMap(
         noMap(transforms_.noTransform(fixed_frame_, "the frame of octomap_file '" + map.frame_id + "'", reason)));
   }
   return trusted_placed_;
 }
 
-void MonitorPipeline::placeMap(std::int64_t now_ns) {
-  if (!unplaced_map_) return;
-  const LoadedMap& refused = trusted_map_ && !trusted_map_->surface ? *trusted_map_ : *unplaced_map_;
-  if (!refused.surface) {
-    // What was there before is out of date, and no map is better than a wrong one.
-    if (!config_.takesClouds()) monitor_->missMap();  // a cloud that was left out is in no map
-    monitor_->setMap(noMap(refused.problem));
-    settled_map_ns_ = unplaced_map_->arrival_ns;
-    unplaced_map_.reset();
-    placed_map_.reset();
-    return;
-  }
-  if (fixed_frame_.empty()) return;
-  if (!placeTrusted(now_ns)) return;
-  ObstacleMap map;
-  std::string reason;
-  const bool placed = findPlace(*unplaced_map_, map, reason);
-  const std::string frame = map.frame_id;
-  if (placed) {
-    if (std::exchange(unplaced_map_->after_missed, false)) monitor_->missMap();
-    monitor_->setMap(std::move(map));
-    monitor_->mapSeen(frame, lookBack(frame, fixed_frame_));
-    settled_map_ns_ = unplaced_map_->arrival_ns;
-    if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
-    unplaced_map_.reset();
-  } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
-    // It is tried again at every call: a map comes rarely, and its transform may come late.
-    if (monitor_->map().problem.empty()) {
-      monitor_->setMap(noMap(transforms_.noTransform(fixed_frame_, "the octomap's frame '" + frame + "'", reason)));
+bool MonitorPipeline::settleMap(const LoadedMap& loaded, bool may_place, ObstacleMap& map, std::string& reason) {
+  const LoadedMap& refused = trusted_map_ && !trusted_map_->surface ? *trusted_map_ : loaded;
+  if (refused.surface) return may_place && findPlace(loaded, map, reason);
+  // What was there before is out of date, and no map is better than a wrong one.
+  map = noMap(refused.problem);
+  map.missed = config_.takesClouds() ? loaded.missed : "one was refused: " + refused.problem;
+  return true;
+}
+
+/// As far as the newest that has its place, or was refused. Where bodies have own voxels each is looked at in turn,
+/// else the newest alone counts.
+void MonitorPipeline::placeMaps(std::int64_t now_ns) {
+  if (unplaced_maps_.empty()) return;
+  const bool may_place = !fixed_frame_.empty() && placeTrusted(now_ns);
+  ObstacleMap newest, map;
+  std::string reason, unused, missed;
+  std::size_t settled = unplaced_maps_.size();
+  while (settled > 0 && !settleMap(unplaced_maps_[settled - 1].map, may_place, newest, reason)) --settled;
+  for (; settled > 0; --settled) {
+    LoadedMap loaded = std::move(unplaced_maps_.front().map);
+    unplaced_maps_.pop_front();
+    const bool is_newest = settled == 1;
+    if (!is_newest && !config_.ownsVoxels()) continue;
+    if (is_newest) {
+      map = std::move(newest);
+    } else if (!settleMap(loaded, may_place, map, unused)) {
+      missed = "one got no transform to its frame before the next one did";
+      continue;
     }
+    if (map.missed.empty()) map.missed = std::exchange(missed, {});
+    const std::string frame = map.frame_id;
+    const bool is_placed = map.surface != nullptr;
+    monitor_->setMap(std::move(map));
+    settled_map_ns_ = loaded.arrival_ns;
+    placed_map_.reset();
+    if (!is_placed) continue;
+    map_placed_ns_ = now_ns;
+    monitor_->mapSeen(frame, lookBack(frame, fixed_frame_));
+    if (config_.fixed_frame.empty()) placed_map_ = std::move(loaded);
+  }
+  if (unplaced_maps_.empty() || !may_place || !monitor_->map().problem.empty()) return;
+  // Each is tried again at every call: its transform may come late. Where those before it went on finding their places
+  // while it waited, tf lags, and the map in use is the newest that there can be.
+  const UnplacedMap& oldest = unplaced_maps_.front();
+  const bool overdue = finishing_ || secondsBetween(oldest.since_ns, now_ns) >= config_.transform_timeout_s;
+  if (!overdue || map_placed_ns_ > oldest.since_ns) return;
+  monitor_->setMap(
+      noMap(transforms_.noTransform(fixed_frame_, "the octomap's frame '" + oldest.map.frame_id + "'", reason)));
+}
+
+/// Of too many the oldest, which gets its place first, and the newest are kept; of two large ones the newest.
+void MonitorPipeline::limitUnplacedMaps() {
+  const auto isTooMuch = [&] {
+    std::size_t bytes = 0;
+    for (const UnplacedMap& one : unplaced_maps_) {
+      if (one.map.surface) bytes += one.map.surface->memoryBytes();
+      if (one.map.known) bytes += one.map.known->memoryBytes();
+    }
+    return unplaced_maps_.size() > MOST_UNPLACED || bytes > config_.max_map_bytes / SHARE_OF_UNPLACED;
+  };
+  while (unplaced_maps_.size() > 1 && isTooMuch()) {
+    const auto left_out = unplaced_maps_.begin() + (unplaced_maps_.size() > 2 ? 1 : 0);
+    unplaced_maps_.erase(left_out)->map.missed = "too many waited for the transforms of their frame";
   }
 }
 
-bool MonitorPipeline::mapMayCome(std::int64_t now_ns) const {
-  return unplaced_map_ && !finishing_ && secondsBetween(unplaced_since_ns_, now_ns) < config_.transform_timeout_s;
+void MonitorPipeline::nameNewerMap(Outcome& outcome) const {
+  if (!outcome.answered || !outcome.step->map.surface) return;
+  for (const UnplacedMap& one : unplaced_maps_) {
+    if (one.map.arrival_ns > outcome.arrival_ns) continue;
+    outcome.unproved.push_back("an octomap that came before this frame has no place: no transform of its frame '" +
+                               one.map.frame_id + "' at " + secondsOf(one.map.stamp_ns) +
+                               "; raise transform_timeout_s to what tf lags behind");
+    return;
+  }
+}
+
+bool MonitorPipeline::mapMayCome(std::int64_t arrival_ns, std::int64_t now_ns) const {
+  return !finishing_ && std::any_of(unplaced_maps_.begin(), unplaced_maps_.end(), [&](const UnplacedMap& one) {
+    return one.map.arrival_ns <= arrival_ns && secondsBetween(one.since_ns, now_ns) < config_.transform_timeout_s;
+  });
 }
 
 bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   bool all_known = true;
   const auto find = [&](const std::string& target, const std::string& source) {
-    std::vector<SeenPose> seen = posesFrom(target, source, clock_ns_, stamp_ns);
+    std::vector<SeenPose> seen;
+    if (!clock_frames_.empty()) seen = posesFrom(target, source, clock_frames_.back(), stamp_ns);
     std::string unused;
     SeenPose last{stamp_ns, {}};
     const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
-    seen.push_back(known ? last : unknownAt(stamp_ns));
+    seen.push_back(known ? last : unknownAt(stamp_ns, noTransformAt(stamp_ns)));
     all_known = all_known && known;
     return seen;
   };
@@ -312,48 +384,70 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
 std::vector<SeenPose> MonitorPipeline::lookBack(const std::string& target, const std::string& source) const {
   std::vector<SeenPose> seen;
   if (target == source) return seen;
-  StampNs before_ns = 0;
-  for (const StampNs start_ns : monitor_->starts()) {
-    const std::vector<SeenPose> step = posesFrom(target, source, before_ns, start_ns);
-    seen.insert(seen.end(), step.begin(), step.end());
-    before_ns = start_ns;
+  const StampNs start_ns = monitor_->nextStart();
+  for (auto frame = clock_frames_.begin(); frame != clock_frames_.end(); ++frame) {
+    const auto next = std::next(frame);
+    if (next == clock_frames_.end()) {
+      SeenPose last{frame->stamp_ns, {}};
+      std::string unused;  // the next frame asks again
+      if (transforms_.lookup(target, source, frame->stamp_ns, last.pose, unused)) seen.push_back(last);
+    } else if (start_ns != 0 && frame->stamp_ns >= start_ns) {
+      const std::vector<SeenPose> step = posesFrom(target, source, *frame, next->stamp_ns);
+      seen.insert(seen.end(), step.begin(), step.end());
+    }
   }
-  SeenPose last{before_ns, {}};
-  std::string unused;  // the next frame asks again
-  if (before_ns != 0 && transforms_.lookup(target, source, before_ns, last.pose, unused)) seen.push_back(last);
   return seen;
 }
 
+void MonitorPipeline::keepClockFrame(const ClockFrame& frame) {
+  if (frame.stamp_ns == clockNs()) return;  // a duplicate, at which no step ends
+  if (frame.stamp_ns < clockNs()) clock_frames_.clear();
+  clock_frames_.push_back(frame);
+  const StampNs start_ns = monitor_->nextStart();
+  while (clock_frames_.size() > 1 && (start_ns == 0 || clock_frames_.front().stamp_ns < start_ns)) {
+    clock_frames_.pop_front();
+  }
+}
+
 /// As posesBetween(), and where it was at the first of the two, which may lie between two stamps of tf.
-std::vector<SeenPose> MonitorPipeline::posesFrom(const std::string& target, const std::string& source, StampNs from_ns,
-                                                 StampNs to_ns) const {
-  std::vector<SeenPose> seen = posesBetween(target, source, from_ns, to_ns);
-  if (!mayBeAStep(from_ns, to_ns)) return seen;
+std::vector<SeenPose> MonitorPipeline::posesFrom(const std::string& target, const std::string& source,
+                                                 const ClockFrame& from, StampNs to_ns) const {
+  std::vector<SeenPose> seen = posesBetween(target, source, from, to_ns);
+  if (!mayBeAStep(from.stamp_ns, to_ns)) return seen;
   std::string unused;
-  SeenPose first{from_ns, {}};
-  const bool known = transforms_.lookup(target, source, from_ns, first.pose, unused);
-  seen.push_back(known ? first : unknownAt(from_ns + 1));  // of the step that ends there it may be known
+  SeenPose first{from.stamp_ns, {}};
+  const bool known = transforms_.lookup(target, source, from.stamp_ns, first.pose, unused);
+  // Of the step that ends there it may be known.
+  seen.push_back(known ? first : unknownAt(from.stamp_ns + 1, noTransformAt(from.stamp_ns)));
   return seen;
 }
 
 bool MonitorPipeline::mayBeAStep(StampNs from_ns, StampNs to_ns) const {
-  return from_ns != 0 && from_ns < to_ns && secondsBetween(from_ns, to_ns) <= config_.monitor.store.max_step_s + 1e-6;
+  return from_ns < to_ns && secondsBetween(from_ns, to_ns) <= config_.monitor.store.max_step_s + 1e-6;
 }
 
-/// Target_from_source at each stamp of tf between the two, as far back as a step may reach (from 0: not at all).
+/// Target_from_source at each stamp of tf between the two, as far back as a step may reach.
 std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, const std::string& source,
-                                                    StampNs from_ns, StampNs to_ns) const {
+                                                    const ClockFrame& from, StampNs to_ns) const {
   std::vector<SeenPose> seen;
-  if (!mayBeAStep(from_ns, to_ns)) return seen;
+  if (!mayBeAStep(from.stamp_ns, to_ns)) return seen;
   // What tf saw before that, nobody knows any more.
-  if (transforms_.timesForgotten() != times_forgotten_) return {unknownAt(to_ns - 1)};
-  const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from_ns, to_ns);
-  if (stamps.size() > tolerance::MOST_POSES_A_STEP) return {unknownAt(stamps.back())};
+  if (transforms_.timesForgotten() != from.times_forgotten) {
+    return {unknownAt(to_ns - 1, "stamps of tf went back, or a static transform is another one")};
+  }
+  std::vector<TransformFeed::NewParent> changes;
+  const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from.stamp_ns, to_ns, changes);
+  if (stamps.size() > tolerance::MOST_POSES_A_STEP) {
+    return {unknownAt(stamps.back(), "more than " + std::to_string(tolerance::MOST_POSES_A_STEP) + " transforms")};
+  }
   std::string unused;
   for (const StampNs stamp_ns : stamps) {
     SeenPose one{stamp_ns, {}};
     if (transforms_.lookup(target, source, stamp_ns, one.pose, unused)) seen.push_back(one);
   }
+  std::transform(changes.begin(), changes.end(), std::back_inserter(seen), unknownBefore);
+  const auto isBefore = [](const SeenPose& a, const SeenPose& b) { return a.stamp_ns < b.stamp_ns; };
+  std::stable_sort(seen.begin(), seen.end(), isBefore);  // of equal stamps the last one counts
   return seen;
 }
 
@@ -377,9 +471,9 @@ void MonitorPipeline::learnAnew(StepStatus status) {
     static_meshes_[b].reset();
   }
   if (!placed_map_) return;
-  if (!unplaced_map_) unplaced_map_ = std::move(placed_map_);
+  if (unplaced_maps_.empty()) unplaced_maps_.push_back({std::move(*placed_map_)});
   placed_map_.reset();
-  unplaced_since_ns_ = 0;
+  for (UnplacedMap& one : unplaced_maps_) one.since_ns = 0;
   monitor_->setMap({});
 }
 

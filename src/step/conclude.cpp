@@ -228,7 +228,8 @@ double scale(double toc, std::size_t i, std::size_t n, double towards) {
 
 std::uint64_t looseVertices(const Body& body) {
   const Topology& topology = *body.topology;
-  if (body.rigid || topology.usedVertices().size() == topology.vertexCount()) return 0;
+  const std::size_t used = topology.usedVertices().size();
+  if (used == topology.vertexCount() || (body.rigid && used > 0)) return 0;
   std::vector<bool> accounted(topology.vertexCount());
   for (const Index v : topology.usedVertices()) accounted[v] = true;
   for (const Index v : body.vertex_mask) accounted.at(v) = true;

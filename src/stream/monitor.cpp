@@ -222,16 +222,6 @@ void Monitor::setBody(std::size_t body, Body what) {
 
 StampNs Monitor::nextStart() const { return impl_->oldestStart(0); }
 
-std::set<StampNs> Monitor::starts() const {
-  std::set<StampNs> starts;
-  for (const Impl::Pending& step : impl_->pending) {
-    if (step.from) starts.insert(step.from->stamp_ns);
-  }
-  const MeshStore& clock = impl_->stores[impl_->options.clock_body];
-  if (!clock.empty()) starts.insert(clock.newest().stamp_ns);
-  return starts;
-}
-
 void Monitor::withdraw(std::size_t body) {
   Impl& m = *impl_;
   if (m.isStream(body) || m.stores.at(body).empty()) return;

@@ -43,18 +43,13 @@ struct Monitor::Impl {
   std::vector<MeshStore> stores;
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
-  ObstacleMap map, trusted;  // in force; what is occupied besides
-  /// As it was given: newer than what is known of the bodies.
-  struct MapToCome {
-    ObstacleMap map;
-    bool after_missed = false;  // maps came before it that nobody looked at
-  };
-  std::deque<MapToCome> maps_to_come;
-  bool missed_map = false;  // since the last one that was given
+  ObstacleMap map, trusted;              // in force; what is occupied besides
+  std::deque<ObstacleMap> maps_to_come;  // as they were given: newer than what is known of the bodies
+  std::string missed_maps;               // why nobody looked at some since the last one that is to come, or empty
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;  // of the step that is made
   /// For the steps to come: per body, and by the frames of maps.
-  using PosesByStamp = std::map<StampNs, Eigen::Isometry3d>;
+  using PosesByStamp = std::map<StampNs, SeenPose>;
   std::vector<PosesByStamp> held_seen;
   std::map<std::string, PosesByStamp> map_seen;
   History history, side_history, doubt_history;  // of steps; of predictions and checks; of voxels in doubt

@@ -1,7 +1,5 @@
 // What a step is made of: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
-#include <iomanip>
-#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -61,13 +59,9 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
   return bounds;
 }
 
-/// at_ns: the first time of which it is not known.
-std::string unknown(const std::string& name, StampNs at_ns) {
-  std::ostringstream text;
-  text << "where " << name << " was is not known for all of this step (no transform of its frame at "
-       << at_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << at_ns % 1'000'000'000 << " s, more than "
-       << tolerance::MOST_POSES_A_STEP << " of them, or stamps of tf that went back)";
-  return text.str();
+std::string unknown(const std::string& name, const SeenPose& seen) {
+  return "where " + name + " was is not known for all of this step" +
+         (seen.why_unknown.empty() ? "" : " (" + seen.why_unknown + ")");
 }
 
 void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
@@ -148,7 +142,7 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   const Eigen::Isometry3d from_t0 = body.pose_t0.inverse();
   for (const SeenPose& one : seen) {
     if (!one.pose.matrix().allFinite()) {
-      addSentence(step.off_path, unknown("body '" + body.name + "'", one.stamp_ns));
+      addSentence(step.off_path, unknown("body '" + body.name + "'", one));
       break;
     }
     const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionAt(one.stamp_ns));
@@ -175,16 +169,17 @@ void Monitor::Impl::lookAtHeld(Step& step) const {
     const PosesByStamp& seen = is_map ? of_map->second : held_seen[b];
     const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
     double off_m = 0;
-    std::optional<StampNs> unknown_at;
+    const SeenPose* unknown_at = nullptr;
     Eigen::AlignedBox3d bounds;
     // From its start on: what is elsewhere there moves back within the step.
     const auto end = seen.upper_bound(step.stamp_ns);
     for (auto one = seen.lower_bound(step.start_ns); one != end; ++one) {
-      if (!unknown_at && !one->second.matrix().allFinite()) unknown_at = one->first;
-      if (unknown_at || one->second.matrix() == held.matrix()) continue;
+      const Eigen::Isometry3d& pose = one->second.pose;
+      if (!unknown_at && !pose.matrix().allFinite()) unknown_at = &one->second;
+      if (unknown_at || pose.matrix() == held.matrix()) continue;
       if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
-      off_m = std::max(off_m, is_map ? apart(one->second, held, bounds)
-                                     : apart(one->second * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
+      off_m = std::max(off_m, is_map ? apart(pose, held, bounds)
+                                     : apart(pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
     }
     const std::string name = is_map ? "the octomap's frame '" + step.map.frame_id + "'"
                                     : "the frame of the static body '" + bodies[b].name + "'";
@@ -269,7 +264,7 @@ void Monitor::mapSeen(const std::string& frame, const std::vector<SeenPose>& pos
 }
 
 void Monitor::Impl::keepSeen(const std::vector<SeenPose>& poses, PosesByStamp& all) const {
-  for (const SeenPose& one : poses) all.insert_or_assign(one.stamp_ns, one.pose);
+  for (const SeenPose& one : poses) all.insert_or_assign(one.stamp_ns, one);
   // Also where no step is ever made.
   if (!all.empty()) all.erase(all.begin(), all.lower_bound(oldestStart(all.rbegin()->first)));
 }

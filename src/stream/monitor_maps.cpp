@@ -18,7 +18,7 @@ constexpr std::size_t MOST_MAPS_TO_COME = 16, FEWEST_MAPS_TO_COME = 4, MOST_BYTE
 }  // namespace
 
 const ObstacleMap& Monitor::map() const {
-  return impl_->maps_to_come.empty() ? impl_->map : impl_->maps_to_come.back().map;
+  return impl_->maps_to_come.empty() ? impl_->map : impl_->maps_to_come.back();
 }
 
 const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
@@ -26,7 +26,7 @@ const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
 std::set<std::string> Monitor::mapFrames() const {
   std::set<std::string> frames;
   if (impl_->map.surface) frames.insert(impl_->map.frame_id);
-  for (const Impl::MapToCome& one : impl_->maps_to_come) frames.insert(one.map.frame_id);
+  for (const ObstacleMap& one : impl_->maps_to_come) frames.insert(one.frame_id);
   return frames;
 }
 
@@ -41,31 +41,32 @@ void Monitor::setMap(ObstacleMap map) {
   }
   const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
-    if (!m.maps_to_come.empty()) m.missed_map = true;
+    if (!m.maps_to_come.empty()) m.missed_maps = "they waited for the bodies' frames when the map was void";
+    if (!map.missed.empty()) m.missed_maps = std::move(map.missed);
     m.maps_to_come.clear();
     if (as_it_is) m.own_voxels.forget();
     m.map = std::move(map);
     return;
   }
-  m.maps_to_come.push_back({std::move(map), std::exchange(m.missed_map, false)});
+  if (map.missed.empty()) map.missed = std::move(m.missed_maps);
+  m.missed_maps.clear();
+  m.maps_to_come.push_back(std::move(map));
   m.limitMapsToCome();
-  if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().map.stamp_ns);
+  if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().stamp_ns);
 }
 
 /// Of too many the oldest and the newest ones are kept.
 void Monitor::Impl::limitMapsToCome() {
   const auto isTooMuch = [&] {
     std::size_t bytes = 0;
-    for (const MapToCome& one : maps_to_come) bytes += one.map.surface->memoryBytes();
+    for (const ObstacleMap& one : maps_to_come) bytes += one.surface->memoryBytes();
     return maps_to_come.size() > (bytes > MOST_BYTES_TO_COME ? FEWEST_MAPS_TO_COME : MOST_MAPS_TO_COME);
   };
   while (isTooMuch()) {
     maps_to_come.erase(maps_to_come.begin() + 1);
-    maps_to_come[1].after_missed = true;
+    maps_to_come[1].missed = "too many came between two frames of the bodies";
   }
 }
-
-void Monitor::missMap() { impl_->missed_map = true; }
 
 void Monitor::setMapBeside(ObstacleMap map) { impl_->trusted = std::move(map); }
 
@@ -85,12 +86,10 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
   if (maps_to_come.empty() && std::any_of(bodies.begin(), bodies.end(), ownsVoxels)) return;
   const std::vector<TrackedBody> bodies_tracked = tracked();
   std::size_t taken = maps_to_come.size();
-  while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].map.stamp_ns > known_until_ns) --taken;
+  while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].stamp_ns > known_until_ns) --taken;
   if (bodies_tracked.empty()) own_voxels.forget();
   for (; taken > 0; --taken) {
-    const MapToCome& next = maps_to_come.front();
-    if (next.after_missed) own_voxels.missMaps();
-    takeMap(next.map, bodies_tracked);
+    takeMap(maps_to_come.front(), bodies_tracked);
     maps_to_come.pop_front();  // should memory end before, the next step takes it
   }
 }
@@ -102,9 +101,9 @@ void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBo
     problem << "the octomap has voxels of " << next.surface->resolution() << " m in frame '" << next.frame_id
             << "', and octomap_file of " << sure->resolution() << " m in '" << trusted.frame_id
             << "'; used together they must have the same";
-    own_voxels.missMaps();
     map = ObstacleMap();
     map.problem = problem.str();
+    own_voxels.missMaps(map.problem);
     return;
   }
   const auto start = Deadline::Clock::now();
@@ -135,7 +134,7 @@ void Monitor::Impl::settleDoubt(Step& step, const Deadline& deadline) {
 
 StampNs Monitor::Impl::wayNeededFrom(std::size_t body, StampNs stamp_ns) const {
   if (!ownsVoxels(bodies[body])) return stamp_ns;
-  const StampNs map_ns = maps_to_come.empty() ? stamp_ns : std::min(stamp_ns, maps_to_come.front().map.stamp_ns);
+  const StampNs map_ns = maps_to_come.empty() ? stamp_ns : std::min(stamp_ns, maps_to_come.front().stamp_ns);
   return own_voxels.pathNeededFrom(map_ns, options.own_voxels_lag_s);
 }
 

@@ -68,8 +68,8 @@ KeyBox reachedKeys(const ObstacleMap& map, const std::vector<TrackedBody>& bodie
 
 std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
 
-/// Sets the counts of what is own and what is in doubt, and a sentence of each, by body.
-void describe(const std::vector<TrackedBody>& bodies, bool trust_first, bool missed, OwnVoxels& own) {
+/// Sets the counts of what is own and what is in doubt, and a sentence of each, by body. missed: doubts_missed_.
+void describe(const std::vector<TrackedBody>& bodies, bool trust_first, const std::string& missed, OwnVoxels& own) {
   for (const TrackedBody& body : bodies) {
     std::uint64_t its = 0, doubted = 0;
     for (const OwnVoxel& voxel : *own.voxels) {
@@ -88,7 +88,8 @@ void describe(const std::vector<TrackedBody>& bodies, bool trust_first, bool mis
   if (trust_first && !own.excluded.empty()) own.excluded += ", by own_voxels_doubt: trust the first map's, too";
   if (own.doubt.empty()) return;
   own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
-  own.doubt += missed ? " there in the first map after some that were not looked at" : " there in the first map";
+  own.doubt += " there in the first map";
+  if (!missed.empty()) own.doubt += " after some that were not looked at (" + missed + ")";
   own.doubt +=
       ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it away "
       "once, or set own_voxels_doubt: trust";
@@ -100,7 +101,7 @@ void OwnVoxelFinder::forget() {
   before_ = nullptr;
   own_.clear();
   remembered_.clear();
-  missed_ = false;
+  missed_.clear();
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
@@ -191,12 +192,12 @@ void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSp
   }
   remembered_ = std::move(remembered);  // at once: where memory ends before, the same map comes again
   // One that was not looked at may have shown it free, or before the body came near.
-  if (missed_ && !trust_first) {
+  if (!missed_.empty() && !trust_first) {
     for (auto& one : own_) one.second.doubted = true;
   }
   const bool any_doubted = std::any_of(own_.begin(), own_.end(), [](const auto& one) { return one.second.doubted; });
-  doubts_missed_ = any_doubted && (doubts_missed_ || missed_);
-  missed_ = false;
+  if (!missed_.empty()) doubts_missed_ = std::exchange(missed_, {});
+  if (!any_doubted) doubts_missed_.clear();
 }
 
 ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies,
@@ -205,6 +206,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (TrackedBody& body : bodies) {
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
   }
+  if (!map.missed.empty()) missMaps(map.missed);
   const bool is_other = before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id);
   if (is_other || remembered_.size() > MOST_REMEMBERED) forget();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};

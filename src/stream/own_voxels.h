@@ -37,8 +37,8 @@ class OwnVoxelFinder {
   ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies, double lag_s,
                      bool trust_first);
   void forget();
-  /// Maps between the last one and the next were not looked at.
-  void missMaps() { missed_ = true; }
+  /// Maps between the last one and the next were not looked at, as ObstacleMap::missed says, too.
+  void missMaps(const std::string& why) { missed_ = why; }
   /// Whether the body had own voxels of a map that reduce() came to the end of.
   bool forgetBody(std::uint16_t body);
   /// What reduce() made of the last map, by what is own now.
@@ -67,8 +67,8 @@ class OwnVoxelFinder {
   std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
   std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
   std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
-  bool missed_ = false;                              // maps, since the last one
-  bool doubts_missed_ = false;                       // some doubt is for that reason
+  std::string missed_;                               // why maps were not looked at since the last one; empty: all were
+  std::string doubts_missed_;                        // the same, where some doubt is for that reason
 };
 
 }  // namespace dccd

@@ -45,6 +45,13 @@ class Transforms : public ::testing::Test {
     std::normal_distribution<double> normal;
     return Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
   }
+  /// The stamps, where no frame changes its parent.
+  std::vector<StampNs> between(const std::string& target, const std::string& source, StampNs from_ns, StampNs to_ns) {
+    std::vector<TransformFeed::NewParent> changes;
+    const std::vector<StampNs> stamps = feed.stampsBetween(target, source, from_ns, to_ns, changes);
+    EXPECT_TRUE(changes.empty());
+    return stamps;
+  }
   Eigen::Isometry3d pose(const std::string& target, const std::string& source, StampNs stamp_ns) {
     Eigen::Isometry3d found;
     EXPECT_TRUE(feed.lookup(target, source, stamp_ns, found, reason)) << reason;
@@ -110,15 +117,14 @@ TEST_F(Transforms, StampsAndTheFirstOneAreThoseOfTheWayBetweenTheTwoFrames) {
     for (const int one : ms) stamps.push_back(START + one * MS);
     return stamps;
   };
-  EXPECT_EQ(feed.stampsBetween("base", "tool", START, START + 30 * MS), after({4, 10, 20, 24}));
-  EXPECT_EQ(feed.stampsBetween("tool", "world", START, START + 20 * MS), after({4, 10}));
-  EXPECT_EQ(feed.stampsBetween("world", "base", START, START + 30 * MS), after({})) << "static";
-  EXPECT_EQ(feed.stampsBetween("world", "camera", START + 30 * MS, START), after({})) << "the wrong way round";
-  for (int again = 0; again < 2; ++again)
-    EXPECT_EQ(feed.stampsBetween("base", "hand", START, START + 5 * MS), after({}));
-  EXPECT_EQ(feed.stampsBetween("base", "tool", START, START + 5 * MS), after({4}));
+  EXPECT_EQ(between("base", "tool", START, START + 30 * MS), after({4, 10, 20, 24}));
+  EXPECT_EQ(between("tool", "world", START, START + 20 * MS), after({4, 10}));
+  EXPECT_EQ(between("world", "base", START, START + 30 * MS), after({})) << "static";
+  EXPECT_EQ(between("world", "camera", START + 30 * MS, START), after({})) << "the wrong way round";
+  for (int again = 0; again < 2; ++again) EXPECT_EQ(between("base", "hand", START, START + 5 * MS), after({}));
+  EXPECT_EQ(between("base", "tool", START, START + 5 * MS), after({4}));
   add(sent("base", "hand", START + 3 * MS, turn(), place()));
-  EXPECT_EQ(feed.stampsBetween("base", "hand", START, START + 5 * MS), after({3})) << "it came late";
+  EXPECT_EQ(between("base", "hand", START, START + 5 * MS), after({3})) << "it came late";
   EXPECT_EQ(feed.firstStamp("world", "tool"), START + 4 * MS);
   EXPECT_FALSE(feed.firstStamp("world", "base").has_value());
   EXPECT_FALSE(feed.firstStamp("world", "nobody").has_value());

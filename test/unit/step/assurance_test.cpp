@@ -39,6 +39,11 @@ void lose(Asked& asked) {
 
 void loosen(Asked& asked) { asked.upper().topology = share(Topology::fromTriangles(16, {{0, 1, 2}})); }
 
+void leaveRigidPoints(Asked& asked) {
+  asked.upper().rigid = true;
+  asked.upper().topology = share(Topology::fromTriangles(16, {}));
+}
+
 void turnFar(Asked& asked) {
   asked.upper().turns = asked.upper().rigid = true;
   asked.upper().pose_t1 = Eigen::AngleAxisd(3, Vec3::UnitZ()) * Eigen::Translation3d(0, 0, -0.25);
@@ -59,6 +64,7 @@ const std::vector<Missing>& list() {
       {"a position", "1 vertex is not finite", lose},
       {"a face", "7 faces were sent that cannot be used", [](Asked& a) { a.upper().dropped_faces = 7; }},
       {"a surface at a vertex", "13 vertices belong to no face and no edge", loosen},
+      {"a rigid body's surface", "16 vertices belong to no face and no edge", leaveRigidPoints},
       {"the map that is expected", "nobody came",
        [](Asked& a) {
          a.options.obstacle_expected = true;

@@ -360,7 +360,7 @@ TEST_F(OwnVoxels, AfterAMapThatWasRefusedNothingIsOwn) {
     if (why == WAITED) map(150 * MS, slab(1) + voxelsOf(0.85));
     ObstacleMap refused;
     refused.problem = "a test";
-    if (why == REFUSED) monitor_->missMap();
+    if (why == REFUSED) refused.missed = refused.problem;
     monitor_->setMap(why == MISFIT ? mapOf(0.2, leavesOf(layer(4, 1, 4)), 150 * MS) : refused);
     EXPECT_EQ(feed(200 * MS, 0.78).status, StepStatus::NO_MAP);
     map(250 * MS, slab(1) + voxelsOf(0.85));

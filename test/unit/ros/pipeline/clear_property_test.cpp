@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <random>
+#include <utility>
 
 #include "dccd/assurance.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
@@ -83,7 +84,11 @@ class World {
   std::map<std::string, int> sides_;  // at the end of the last clear step
   StampNs clear_until_ = 0;
   bool table_refused_ = false, map_refused_ = false, anew_ = false;
-  double cloth_ = 0, other_ = 0.5, finger_ = 0.7, odom_ = -1, held_odom_ = -1;
+  double cloth_ = 0, other_ = 0.5, finger_ = 0.7, arm_ = 0.2, odom_ = -1, held_odom_ = -1;
+  // Of the finger: where it was last sent, in the frame of the arm or of the world; whether in the last 10 ms, and to
+  // stay.
+  double in_parent_ = 0;
+  bool on_arm_ = false, sent_ = true, at_rest_ = true;
 
   bool chance(int one_in) { return random_() % static_cast<std::uint64_t>(one_in) == 0; }
   double level() { return (random_() % 2 ? 1 : -1) * (0.2 + 0.1 * static_cast<double>(random_() % 8)); }
@@ -98,10 +103,10 @@ class World {
     tracks_[name].say(stamp_ns, static_cast<double>(static_cast<float>(z)));
     send(name, stamp_ns, z);
   }
-  void transformTo(const std::string& frame, StampNs stamp_ns, double z) {
+  void transformTo(const std::string& frame, StampNs stamp_ns, double z, const std::string& parent = "world") {
     geometry_msgs::TransformStamped transform;
     transform.header.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns));
-    transform.header.frame_id = "world";
+    transform.header.frame_id = parent;
     transform.child_frame_id = frame;
     transform.transform.translation.z = z;
     transform.transform.rotation.w = 1;
@@ -109,6 +114,20 @@ class World {
     message.transforms.push_back(transform);
     driven_.feed_tf.add(message, false);
     tracks_[frame].say(stamp_ns, z);
+  }
+  /// An arm takes the finger and lays it down again. It is not sent each time, but goes where its parent does.
+  void moveFinger(StampNs t, bool is_last) {
+    const double arm = chance(40) ? level() : arm_;
+    transformTo("arm", t, arm);
+    const bool was_sent = std::exchange(sent_, is_last || !at_rest_ || !chance(3));
+    if (sent_) {
+      if (chance(30)) on_arm_ = !on_arm_;
+      if (was_sent && chance(60)) finger_ = level();
+      at_rest_ = !was_sent || is_last || !chance(60);
+      in_parent_ = (at_rest_ ? finger_ : level()) - (on_arm_ ? arm_ : 0);
+      transformTo("finger", t, in_parent_, on_arm_ ? "arm" : "world");
+    }
+    tracks_["finger"].say(t, in_parent_ + (on_arm_ ? arm : 0));
   }
   void giveMap(StampNs stamp_ns, const std::string& frame = "odom") {
     LoadedMap loaded = decodeMapMessage(map(1), driven_.config);
@@ -124,10 +143,9 @@ class World {
   void tick(StampNs now) {
     for (StampNs t = now - TICK + 10 * MS + tf_off_ns_; t <= now + tf_off_ns_; t += 10 * MS) {
       // Between two frames of the cloth things may go through it and back.
-      const bool dips = t < now && chance(60), slides = chance(60), shifts = chance(200);
-      if (slides) finger_ = level();
+      const bool shifts = chance(200);
       if (shifts) odom_ = odom_ < 0 ? -1.5 : -1;
-      transformTo("finger", t, dips ? level() : finger_);
+      moveFinger(t, t == now + tf_off_ns_);
       transformTo("odom", t, chance(25) ? 0.5 : odom_);  // also at a frame's stamp
     }
     if (chance(8)) {  // the stamps go back, and where it is now nobody saw it go

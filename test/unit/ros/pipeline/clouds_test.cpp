@@ -179,6 +179,52 @@ TEST_F(Clouds, AnOctreeThatIsTooLargeIsRefusedWithWhatToDo) {
       << map.problem;
 }
 
+// What is in the octree, but was in no map that was looked at: the next one shows it beside the cloth that came near.
+TEST_F(Clouds, OneWhoseMapIsRefusedForMemoryLeavesInDoubtWhatTheNextOneShows) {
+  for (const bool refused : {false, true}) {
+    XmlRpcValue tree = cloudScene();
+    tree["own_voxels_m"] = "auto";
+    tree["max_map_mb"] = 160;
+    Driven owner(tree);
+    const MapMemory own_memory(owner.config);
+    CloudMapping mapping(owner.config, owner.feed_tf, own_memory);
+    mapping.setFrame("world");
+    tf2_msgs::TFMessage message;
+    message.transforms.push_back(cameraPose(1));
+    owner.feed_tf.add(message, true);
+    const auto see = [&](const sensor_msgs::PointCloud2& cloud) {
+      LoadedMap map = mapping.add(bytesOf(cloud), 0, [] { return false; });
+      const bool is_map = map.surface != nullptr;
+      owner.pipeline.setMap(std::move(map), 0);
+      return is_map;
+    };
+    owner.feed(1, 0.9f);
+    EXPECT_TRUE(see(tableFrom(1)));
+    EXPECT_TRUE(assuranceOf(owner.feed(1.1, 0.9f)).clear()) << describe(assuranceOf(owner.outcome));
+    // An obstacle at the height 0.35, while the cloth is far above it.
+    const sensor_msgs::PointCloud2 obstacle = cloudOf(1.1, {{0.15f, -0.15f, 0.7f}, {0.25f, -0.25f, 0.7f}});
+    std::vector<std::shared_ptr<const KnownSpace>> held;
+    std::vector<OccupiedLeaf> many;
+    for (std::uint16_t i = 0; i < 40000; ++i) {
+      many.push_back({{static_cast<std::uint16_t>(8 * (i % 200)), static_cast<std::uint16_t>(8 * (i / 200)), 7}, 1});
+    }
+    const std::shared_ptr<const KnownSpace> old = KnownSpace::build(0.1, many);
+    for (std::size_t bytes = 0; refused && bytes < std::size_t{60} << 20; bytes += old->memoryBytes()) {
+      held.push_back(own_memory.counted(old));
+    }
+    EXPECT_EQ(see(obstacle), !refused);
+    owner.feed(1.2, 0.9f);
+    EXPECT_EQ(owner.outcome.status, refused ? StepStatus::NO_MAP : StepStatus::OK);
+    held.clear();
+    owner.feed(1.3, 0.45f);
+    EXPECT_TRUE(see(cloudOf(1.3, {{0.15f, -0.15f, 0.7f}, {0.25f, -0.25f, 0.7f}})));
+    const Outcome& near = owner.feed(1.4, 0.35f);
+    EXPECT_FALSE(assuranceOf(near).clear()) << refused << ": " << describe(assuranceOf(near));
+    EXPECT_EQ(near.step->map.own.own, 0u);
+    EXPECT_EQ(near.step->map.own.doubted > 0, refused);
+  }
+}
+
 LoadedMap next(MapLoader& loader) {
   LoadedMap loaded;
   while (!loader.take(loaded)) std::this_thread::yield();

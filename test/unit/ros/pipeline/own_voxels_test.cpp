@@ -82,6 +82,33 @@ TEST_F(OwnVoxelsOfANode, AMapThatIsRefusedOrGivesWayLeavesInDoubtWhatTheNextOneS
   }
 }
 
+// Which of the ways it was is said.
+TEST_F(OwnVoxelsOfANode, WhyMapsWereNotLookedAtIsSaid) {
+  Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));
+  driven.feed(1, 0.35f);
+  driven.giveMap(tableAnd(true), 1);
+  driven.feed(1.1, 0.35f);
+  const auto saidAfter = [&](double stamp_s, LoadedMap map) {
+    driven.pipeline.setMap(std::move(map), 0);
+    driven.feed(stamp_s, 0.35f);
+    return describe(assuranceOf(driven.outcome));
+  };
+  LoadedMap late = decodeMapMessage(mapOf(tableAnd(true), 1.1), driven.config);
+  late.missed = "they come faster than the node decodes them; send fewer";
+  EXPECT_NE(saidAfter(1.2, late).find("4 voxels near body 'mesh' that were there in the first map after some that were "
+                                      "not looked at (they come faster than the node decodes them; send fewer)"),
+            std::string::npos);
+  LoadedMap refused, whole = decodeMapMessage(mapOf(tableAnd(true), 1.3), driven.config);
+  refused.problem = "a test";
+  driven.pipeline.setMap(refused, 0);
+  EXPECT_NE(saidAfter(1.4, whole).find("not looked at (one was refused: a test)"), std::string::npos);
+  LoadedMap lost = whole;
+  lost.frame_id = "nowhere";
+  driven.pipeline.setMap(lost, 0);
+  EXPECT_NE(saidAfter(1.5, whole).find("(one got no transform to its frame before the next one did)"),
+            std::string::npos);
+}
+
 // While a map is decoded, or the worker is in a step, more of them come.
 TEST_F(OwnVoxelsOfANode, TheLoaderKeepsFinishedMapsAndSaysWhichCameAfterOthers) {
   for (const bool owns : {true, false}) {
@@ -108,7 +135,7 @@ TEST_F(OwnVoxelsOfANode, TheLoaderKeepsFinishedMapsAndSaysWhichCameAfterOthers) 
       finished(i - 1);
     }
     std::vector<std::pair<StampNs, bool>> taken;
-    for (LoadedMap one; loader.take(one);) taken.emplace_back(one.stamp_ns / 1000000000, one.after_missed);
+    for (LoadedMap one; loader.take(one);) taken.emplace_back(one.stamp_ns / 1000000000, !one.missed.empty());
     if (owns) {
       const std::vector<std::pair<StampNs, bool>> first_and_last{{1, false}, {3, true}, {4, false}, {7, true}};
       EXPECT_EQ(taken, first_and_last);
