@@ -114,6 +114,18 @@ TEST_F(TransformFeedTest, AFrameOnBothTopicsHasNoPlaceUnlessTheyAgree) {
   }
 }
 
+TEST_F(TransformFeedTest, WhatAFrameOnBothTopicsCarriedHasNoPlaceAtThatTime) {
+  feed.add(turned("tool", 1, 1, 3), true);
+  for (const double stamp_s : {1.0, 1.5}) feed.add(turned("cup", 1, stamp_s, 0, "tool"), false);
+  feed.add(turned("cup", 1, 2, 3), false);
+  feed.add(turned("tool", 1, 2, 3.5), false);
+  Eigen::Isometry3d pose;
+  std::string reason;
+  EXPECT_TRUE(feed.lookup("world", "cup", 2000000000, pose, reason)) << reason;
+  EXPECT_FALSE(feed.lookup("world", "cup", 1500000000, pose, reason));
+  EXPECT_EQ(reason, "'tool' is on /tf and, elsewhere, on /tf_static");
+}
+
 TEST_F(TransformFeedTest, TheReasonOfAFrameWithoutAPlaceNamesThem) {
   Driven driven(scene("transform_timeout_s: 0.0"));
   driven.feed_tf.add(turned("camera", 1.2, 1), true);
