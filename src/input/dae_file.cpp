@@ -130,6 +130,11 @@ class Ids : public tinyxml2::XMLVisitor {
   std::vector<const XMLElement*> units_;
 };
 
+/// That it is one of these: another one, as of another namespace, may be what the file means.
+void requireKnown(const XMLElement& at, std::initializer_list<std::string_view> names) {
+  if (std::find(names.begin(), names.end(), at.Name()) == names.end()) refuse(at, "is not known where it stands");
+}
+
 /// One of a node; of what is none, the identity.
 Eigen::Affine3d transformOf(const XMLElement& at) {
   static const std::map<std::string_view, std::size_t> TRANSFORMS{
@@ -138,7 +143,11 @@ Eigen::Affine3d transformOf(const XMLElement& at) {
   if (name == "skew" || name == "lookat") refuse(at, "is not read; write the node with a <matrix>");
   Eigen::Affine3d transform = Eigen::Affine3d::Identity();
   const auto known = TRANSFORMS.find(name);
-  if (known == TRANSFORMS.end()) return transform;
+  if (known == TRANSFORMS.end()) {
+    requireKnown(at, {"asset", "extra", "instance_camera", "instance_controller", "instance_geometry", "instance_light",
+                      "instance_node", "node"});
+    return transform;
+  }
   const std::vector<double> n = numbersOf(at);
   if (n.size() != known->second) refuse(at, "must have " + std::to_string(known->second) + " numbers");
   if (name == "translate") transform.translate(Vec3(n[0], n[1], n[2]));
@@ -203,13 +212,15 @@ class DaeReader {
                 [&](const XMLElement& use) { addNode(ids_.find(use, "url", "node"), pose, depth + 1); });
   }
 
-  /// Polygons of every kind that there is; nothing of what is none.
+  /// Polygons of every kind that there is; nothing of what else a mesh has.
   void addPrimitive(const XMLElement& at, const Eigen::Affine3d& pose) {
     step(at, STEPS_OF_ELEMENT);
     const std::string_view kind = at.Name();
     const bool triangles = kind == "triangles", lines = kind == "lines", listed = kind == "polylist",
                strips = kind == "tristrips", fans = kind == "trifans", chains = kind == "linestrips";
-    if (!triangles && !lines && !listed && !strips && !fans && !chains && kind != "polygons") return;
+    if (!triangles && !lines && !listed && !strips && !fans && !chains && kind != "polygons") {
+      return requireKnown(at, {"source", "vertices", "extra"});
+    }
     forChildren(at, "ph", [](const XMLElement& ph) { refuse(ph, "is a polygon with holes; write it with triangles"); });
     std::vector<std::size_t> sizes;
     forChildren(at, "vcount", [&](const XMLElement& vcount) {
@@ -254,6 +265,7 @@ class DaeReader {
     const Positions* known = nullptr;
     std::size_t offset = 0, stride = 1, word = 0;
     forChildren(primitive, "input", [&](const XMLElement& input) {
+      if (!input.Attribute("offset")) refuse(input, "has no offset");
       const std::size_t at = countOf(input, "offset", 0);
       stride = std::max(stride, at + 1);
       if (attribute(input, "semantic") != "VERTEX") return;

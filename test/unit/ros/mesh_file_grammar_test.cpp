@@ -816,6 +816,12 @@ TEST_F(DaeGrammar, WhatContradictsItself) {
   expectBad(mesh_end, mesh_end + "<mesh></mesh>", "<geometry> has several <mesh>");
   expectBad("</technique_common>", "</technique_common><technique_common/>", "<source> has several <technique_common>");
   expectBad("</accessor>", "</accessor><accessor/>", "<technique_common> has several <accessor>");
+  expectBad(" offset=\"0\"", "", "<input> has no offset");
+  for (const char* name : {"quads", "Triangles", "c:triangles"}) {
+    const std::string other = "<" + std::string(name) + " count=\"0\"/>";
+    expectBad(mesh_end, other + mesh_end, "<" + std::string(name) + "> is not known where it stands");
+    expectBad("</node>", other + "</node>", "<" + std::string(name) + "> is not known where it stands");
+  }
   for (const std::string lists : {"", "<p>0 1 2</p><p>2 1 3</p>", "<p>0 1 2 2 1 3</p><p>0 1 2 2 1 3</p>"}) {
     for (const char* count : {" count=\"2\"", "", " count=\"4\""}) {
       const std::string list = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><vcount>3 3</vcount>" + lists;
