@@ -391,8 +391,7 @@ void PatchTracker::begin(Outcome& outcome) {
 /// The step becomes the trace, without what has not touched for longer than the gap.
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   alive_.clear();
-  for (auto& [id, living] : living_) living.unexpected = false;
-  std::uint64_t unexpected_id = 0;  // the last one that was told so
+  std::vector<std::uint64_t> unexpected;  // of what does not touch now
   std::size_t kept = 0;
   for (std::size_t i = 0; i < current_.size(); ++i) {
     const TouchGraph::Spot& spot = all_.spots[i];
@@ -411,7 +410,7 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
       part.lasts_unexpected = part.lasts_unexpected || !expected;
     } else {
       if (alive_.empty() || alive_.back() != id) alive_.push_back(id);
-      if (!expected && id != unexpected_id) living_.at(unexpected_id = id).unexpected = true;
+      if (!expected && (unexpected.empty() || unexpected.back() != id)) unexpected.push_back(id);
     }
     if (kept != i) all_.spots[kept] = spot;
     all_.spots[kept].expected = expected;
@@ -429,10 +428,13 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
     Living& living = living_.at(part.id);
     living.touched_ns = std::max(living.touched_ns, outcome.stampBefore(part.toc_lower));
     living.released_ns = UNKNOWN_NS;
-    living.unexpected = living.unexpected || part.lasts_unexpected;
+    if (part.lasts_unexpected) unexpected.push_back(part.id);
     alive_.push_back(part.id);
   }
   std::sort(alive_.begin(), alive_.end());
+  // What is gone stays what it was to its end.
+  for (const std::uint64_t id : alive_) living_.at(id).unexpected = false;
+  for (const std::uint64_t id : unexpected) living_.at(id).unexpected = true;
 }
 
 void PatchTracker::endWhatIsGone(Outcome& outcome) {
