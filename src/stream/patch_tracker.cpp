@@ -29,6 +29,7 @@ std::uint32_t PatchTracker::Trace::at(Index vertex, Index across, const std::arr
   spot.body = body;
   known.emplace_back();
   before.push_back(last);
+  joined_parts = 0;
   return last = static_cast<std::uint32_t>(spots.size() - 1);
 }
 
@@ -37,6 +38,7 @@ void PatchTracker::Trace::keep(const F& isKept) {
   std::size_t kept = 0;
   while (kept < size() && isKept(spots[kept], known[kept])) ++kept;
   if (kept == size()) return;
+  joined_parts = 0;
   for (std::size_t i = size(); i-- > kept;) last_at[spots[i].vertex[0]] = before[i];
   for (std::size_t i = kept + 1; i < size(); ++i) {
     if (!isKept(spots[i], known[i])) continue;
@@ -46,7 +48,7 @@ void PatchTracker::Trace::keep(const F& isKept) {
     ++kept;
   }
   const auto shorten = [kept](auto&... buffers) { ((buffers.resize(kept), releaseBurst(buffers)), ...); };
-  shorten(spots, known, before);
+  shorten(spots, known, before, part_of);
 }
 
 void PatchTracker::Trace::clear() {
@@ -285,32 +287,38 @@ bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) con
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
   const std::vector<PatchSpot>& spots = found.spots();
-  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
-  empty(part_of_, parts_);
+  releaseBurst(parts_);
+  parts_.clear();
   graph_.clear();             // what a burst made of it is given back
   if (spots.empty()) return;  // of what does not touch nobody asks what belongs together
-  part_of_.resize(all_.size());
+  std::vector<std::uint32_t>& part_of = all_.part_of;
   if (spots.size() == all_.size()) {  // all that touched still does: the patches of the step are the parts
-    for (std::size_t s = 0; s < spots.size(); ++s) part_of_[at_[s]] = spots[s].patch;
+    part_of.resize(all_.size());
+    for (std::size_t s = 0; s < spots.size(); ++s) part_of[at_[s]] = spots[s].patch;
+    all_.joined_parts = 0;  // in another order than that of the spots
     parts_.resize(outcome.patches.size());
   } else {
-    graph_.add(all_.spots.data(), all_.spots.data() + all_.size());
-    graph_.findPatches();
-    graph_.forEach([&](const TouchGroup&, std::uint32_t first, std::uint32_t last, std::uint32_t part) {
-      std::fill(part_of_.begin() + first, part_of_.begin() + last, part);
-    });
-    parts_.resize(graph_.patchCount());
+    if (all_.joined_parts == 0) {
+      graph_.add(all_.spots.data(), all_.spots.data() + all_.size());
+      graph_.findPatches();
+      part_of.clear();
+      graph_.forEach([&](const TouchGroup&, std::uint32_t first, std::uint32_t last, std::uint32_t part) {
+        part_of.insert(part_of.end(), last - first, part);
+      });
+      all_.joined_parts = graph_.patchCount();
+    }
+    parts_.resize(all_.joined_parts);
   }
   std::uint32_t last_part = NO_PATCH;
   std::uint64_t last_id = 0;
   for (std::size_t i = 0; i < old_; ++i) {
-    const std::uint32_t part = part_of_[i];
+    const std::uint32_t part = part_of[i];
     const std::uint64_t id = all_.known[i].id;
     if (id == last_id && part == last_part) continue;
     parts_[last_part = part].before.push_back(last_id = id);
   }
   part_of_patch_.resize(outcome.patches.size());
-  for (std::size_t s = 0; s < spots.size(); ++s) part_of_patch_[spots[s].patch] = part_of_[at_[s]];
+  for (std::size_t s = 0; s < spots.size(); ++s) part_of_patch_[spots[s].patch] = part_of[at_[s]];
   for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
     const Patch& patch = outcome.patches[p];
     Part& part = parts_[part_of_patch_[p]];
@@ -400,7 +408,7 @@ void PatchTracker::begin(Outcome& outcome) {
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   const auto changes = [this](const Part& part) { return changesHands(part); };
   if (forgot_burst_ || std::any_of(parts_.begin(), parts_.end(), changes)) askAllSpots();
-  for (std::size_t i = old_; i < all_.size(); ++i) all_.known[i].id = parts_[part_of_[i]].id;
+  for (std::size_t i = old_; i < all_.size(); ++i) all_.known[i].id = parts_[all_.part_of[i]].id;
   std::swap(all_, trace_);
   const auto gap_ns = static_cast<std::int64_t>(std::min(gap_s * 1e9, 0x1p62));
   for (Clock* const clock : {&mesh_clock_, &map_clock_}) {
@@ -436,7 +444,7 @@ void PatchTracker::askAllSpots() {
   for (std::size_t i = 0; i < all_.size(); ++i) {
     TouchGraph::Spot& spot = all_.spots[i];
     Known& known = all_.known[i];
-    const Part& part = parts_[part_of_[i]];
+    const Part& part = parts_[all_.part_of[i]];
     if (part.touches) known.id = part.id;
     // All of it is expected now: what was not, when other things were expected, is over.
     if (part.touches && expectsOtherwise() && !part.isUnexpected()) spot.expected = true;

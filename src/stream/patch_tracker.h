@@ -58,6 +58,8 @@ class PatchTracker {
     std::vector<Known> known;
     std::vector<std::uint32_t> before;   // per spot: the one before it at its vertex; NO_INDEX
     std::vector<std::uint32_t> last_at;  // per vertex; NO_INDEX
+    std::vector<std::uint32_t> part_of;  // per spot
+    std::size_t joined_parts = 0;        // to so many they are joined; 0: not since one came or went
     std::size_t size() const { return spots.size(); }
     /// The spot there; a new one if there is none.
     std::uint32_t at(Index vertex, Index across, const std::array<std::uint16_t, 2>& body);
@@ -128,11 +130,10 @@ class PatchTracker {
 
   // Buffers of a step.
   TouchGraph graph_;
-  Trace all_;                           // the trace, then what is new in the step
-  std::size_t old_ = 0;                 // how much of it is the trace
-  bool forgot_burst_ = false;           // the trace is not in all_
-  std::vector<std::uint32_t> at_;       // per spot of the step, its place in all_
-  std::vector<std::uint32_t> part_of_;  // per one of these
+  Trace all_;                      // the trace, then what is new in the step
+  std::size_t old_ = 0;            // how much of it is the trace
+  bool forgot_burst_ = false;      // the trace is not in all_
+  std::vector<std::uint32_t> at_;  // per spot of the step, its place in all_
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
 };
