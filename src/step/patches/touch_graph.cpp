@@ -165,7 +165,7 @@ void TouchGraph::findAreasOf(std::size_t body) {
     Index root = area_[vertex] = vertex;
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
-      if (!is_touched_[other]) continue;
+      if (!is_touched_[other] || area_[other] == root) continue;
       const Index other_root = areaRoot(other);
       area_[std::max(root, other_root)] = std::min(root, other_root);
       root = std::min(root, other_root);
