@@ -19,11 +19,45 @@ bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
 
 }  // namespace
 
-void PatchTracker::Trace::resize(std::size_t size) {
-  spots.resize(size);
-  known.resize(size);
-  releaseBurst(spots);
-  releaseBurst(known);
+std::uint32_t PatchTracker::Trace::at(Index vertex, Index across, const std::array<std::uint16_t, 2>& body) {
+  std::uint32_t& last = last_at[vertex];
+  for (std::uint32_t i = last; i != NO_INDEX; i = before[i]) {
+    if (spots[i].vertex[1] == across) return i;
+  }
+  TouchGraph::Spot& spot = spots.emplace_back();
+  spot.vertex = {vertex, across};
+  spot.body = body;
+  known.emplace_back();
+  before.push_back(last);
+  joined_parts = 0;
+  return last = static_cast<std::uint32_t>(spots.size() - 1);
+}
+
+template <class F>
+void PatchTracker::Trace::keep(const F& isKept) {
+  std::size_t kept = 0;
+  while (kept < size() && isKept(spots[kept], known[kept])) ++kept;
+  if (kept == size()) return;
+  joined_parts = 0;
+  for (std::size_t i = size(); i-- > kept;) last_at[spots[i].vertex[0]] = before[i];
+  for (std::size_t i = kept + 1; i < size(); ++i) {
+    if (!isKept(spots[i], known[i])) continue;
+    spots[kept] = spots[i];
+    known[kept] = known[i];
+    before[kept] = std::exchange(last_at[spots[i].vertex[0]], static_cast<std::uint32_t>(kept));
+    ++kept;
+  }
+  const auto shorten = [kept](auto&... buffers) { ((buffers.resize(kept), releaseBurst(buffers)), ...); };
+  shorten(spots, known, before, part_of);
+}
+
+void PatchTracker::Trace::clear() {
+  keep([](const TouchGraph::Spot&, const Known&) { return false; });
+}
+
+void PatchTracker::Trace::numberVertices(std::size_t count) {
+  last_at.assign(count, NO_INDEX);
+  for (std::uint32_t i = 0; i < size(); ++i) before[i] = std::exchange(last_at[spots[i].vertex[0]], i);
 }
 
 PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
@@ -49,16 +83,8 @@ void PatchTracker::seam(std::size_t body) {
     waiting_.back().to_ns = at->second.released_ns;  // known only where it had been let go before the seam
     at = living_.erase(at);
   }
-  if (body == ALL) {
-    trace_.resize(0);
-    has_last_ = false;
-    return;
-  }
-  std::swap(trace_, all_);
-  trace_.resize(0);
-  for (std::size_t i = 0; i < all_.spots.size(); ++i) {
-    if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
-  }
+  trace_.keep([&](const TouchGraph::Spot& spot, const Known&) { return !isOf(spot.body, body); });
+  if (body == ALL) has_last_ = false;
 }
 
 void PatchTracker::expect(const std::vector<Expectation>& expected) {
@@ -69,6 +95,7 @@ void PatchTracker::expect(const std::vector<Expectation>& expected) {
 
 void PatchTracker::forget(Outcome& outcome) noexcept {
   static_assert(std::is_nothrow_default_constructible_v<TouchGraph> && std::is_nothrow_move_assignable_v<TouchGraph>);
+  trace_ = all_ = Trace();
   try {
     waiting_.insert(waiting_.end(), outcome.patch_events.begin(), outcome.patch_events.end());
     outcome.patch_events.clear();
@@ -77,7 +104,6 @@ void PatchTracker::forget(Outcome& outcome) noexcept {
     // There is no memory for telling what has ended either.
   }
   living_.clear();
-  trace_ = all_ = Trace();
   graph_ = TouchGraph();
   has_last_ = false;
 }
@@ -89,6 +115,7 @@ void PatchTracker::tell(Outcome& outcome) {
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
   takeBodies(outcome.step->bodies);
+  goOn(outcome);
   std::swap(all_, trace_);
   merge(found.spots(), outcome);
   findParts(found, outcome);
@@ -96,7 +123,6 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
   findNews();
   keepIdentities(outcome);
   begin(outcome);
-  goOn(outcome);
   remember(gap_s, outcome);
   endWhatIsGone(outcome);
   name(outcome);
@@ -108,8 +134,7 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
   }
   has_last_ = true;
   for (auto at = cut_off_expected_.begin(); at != cut_off_expected_.end();) {
-    const bool seen = at->first[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
-    at = seen ? cut_off_expected_.erase(at) : std::next(at);
+    at = clockOf(at->first).sees ? cut_off_expected_.erase(at) : std::next(at);
   }
   followed_expectations_ = expectations_;
 }
@@ -133,6 +158,7 @@ void PatchTracker::takeBodies(const std::vector<Body>& bodies) {
       spot.vertex[side] += graph_.firstVertex(body) - begin[body];
     }
   }
+  trace_.numberVertices(graph_.vertexCount());
 }
 
 void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
@@ -141,7 +167,6 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
-  all_.resize(0);
   all_ = trace_;
   merge(found.spots(), outcome);
   findParts(found, outcome);
@@ -209,45 +234,33 @@ void PatchTracker::tellNews(Outcome& outcome) const {
 /// How long ago something touched is told by clocks that stand still while nobody looks: a step that was cut short, or
 /// had no map, does not make what it did not see any older.
 void PatchTracker::goOn(const Outcome& outcome) {
-  mesh_seen_ = outcome.complete && !outcome.cut;
-  map_seen_ = mesh_seen_ && outcome.status != StepStatus::NO_MAP;
-  const std::int64_t duration_ns = outcome.stamp_ns - outcome.start_ns;
-  if (mesh_seen_) mesh_clock_ns_ += duration_ns;
-  if (map_seen_) map_clock_ns_ += duration_ns;
+  mesh_clock_.sees = outcome.complete && !outcome.cut;
+  map_clock_.sees = mesh_clock_.sees && outcome.status != StepStatus::NO_MAP;
+  for (Clock* const clock : {&mesh_clock_, &map_clock_}) {
+    if (clock->sees) clock->now_ns += outcome.stamp_ns - outcome.start_ns;
+  }
 }
 
-/// Adds what touches in this step to the trace, which all_ is before, each pair of vertices once.
+/// Adds what touches in this step to the trace, which all_ is before, each pair of vertices once. What is too old goes
+/// first; where nothing touches nobody asks for it, and it stays.
 void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& outcome) {
   // After a burst of contacts the trace would cost every later step as much, so it is forgotten early.
-  const std::size_t kept = std::max(tolerance::TRACE_PER_SPOT * spots.size(), tolerance::TRACE_ALWAYS);
-  forgot_burst_ = all_.spots.size() > kept;
-  if (forgot_burst_) all_.resize(0);
-  releaseBurst(before_);
-  before_.resize(all_.spots.size());
-  if (std::exchange(half_merged_, true)) last_at_.clear();
-  last_at_.resize(graph_.vertexCount(), NO_INDEX);
-  for (std::uint32_t i = 0; i < before_.size(); ++i) {
-    before_[i] = std::exchange(last_at_[all_.spots[i].vertex[0]], i);
+  const std::size_t most = std::max(tolerance::TRACE_PER_SPOT * spots.size(), tolerance::TRACE_ALWAYS);
+  if (!spots.empty() || all_.size() > most) {
+    all_.keep([&](const TouchGraph::Spot& spot, const Known& known) { return lasts(spot.body, known.last_ns); });
   }
-  releaseBurst(current_);
-  current_.assign(all_.spots.size(), NO_PATCH);
+  forgot_burst_ = all_.size() > most;
+  if (forgot_burst_) all_.clear();
+  old_ = all_.size();
+  releaseBurst(at_);
+  at_.clear();
   for (const PatchSpot& spot : spots) {
-    std::uint32_t at = last_at_[spot.vertex];
-    while (at != NO_INDEX && all_.spots[at].vertex[1] != spot.across) at = before_[at];
-    if (at == NO_INDEX) {
-      at = static_cast<std::uint32_t>(all_.spots.size());
-      TouchGraph::Spot& one = all_.spots.emplace_back();
-      one.vertex = {spot.vertex, spot.across};
-      one.body = outcome.patches[spot.patch].body;
-      all_.known.emplace_back();
-      before_.push_back(std::exchange(last_at_[spot.vertex], at));
-      current_.push_back(NO_PATCH);
-    }
+    const std::array<std::uint16_t, 2>& body = outcome.patches[spot.patch].body;
+    const std::uint32_t at = all_.at(spot.vertex, spot.across, body);
     all_.spots[at].expected = spot.expected;
-    current_[at] = spot.patch;
+    all_.known[at].last_ns = clockOf(body).now_ns;
+    at_.push_back(at);
   }
-  for (const TouchGraph::Spot& spot : all_.spots) last_at_[spot.vertex[0]] = NO_INDEX;
-  half_merged_ = false;
 }
 
 /// Which parts that were none of a living patch touch, when the step begins, a voxel that the map before did not have.
@@ -273,36 +286,39 @@ bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) con
 }
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
-  releaseBurst(part_of_);
+  const std::vector<PatchSpot>& spots = found.spots();
   releaseBurst(parts_);
-  if (outcome.patches.empty()) {  // of what does not touch nobody asks what belongs together
-    graph_.clear();               // what a burst made of it is given back
-    parts_.assign(1, Part());
-    part_of_.assign(all_.spots.size(), 0);
-    return;
-  }
-  // Where all that touched still does, the patches of the step are the parts.
-  const bool same = all_.spots.size() == found.spots().size();
-  if (same) {
-    part_of_ = current_;
+  parts_.clear();
+  graph_.clear();             // what a burst made of it is given back
+  if (spots.empty()) return;  // of what does not touch nobody asks what belongs together
+  std::vector<std::uint32_t>& part_of = all_.part_of;
+  if (spots.size() == all_.size()) {  // all that touched still does: the patches of the step are the parts
+    part_of.resize(all_.size());
+    for (std::size_t s = 0; s < spots.size(); ++s) part_of[at_[s]] = spots[s].patch;
+    all_.joined_parts = 0;  // in another order than that of the spots
+    parts_.resize(outcome.patches.size());
   } else {
-    graph_.clear();
-    graph_.add(all_.spots.data(), all_.spots.data() + all_.spots.size());
-    graph_.findPatches();
-    part_of_.clear();
-    graph_.forEach([&](const TouchGroup&, std::uint32_t first, std::uint32_t last, std::uint32_t part) {
-      part_of_.insert(part_of_.end(), last - first, part);
-    });
+    if (all_.joined_parts == 0) {
+      graph_.add(all_.spots.data(), all_.spots.data() + all_.size());
+      graph_.findPatches();
+      part_of.clear();
+      graph_.forEach([&](const TouchGroup&, std::uint32_t first, std::uint32_t last, std::uint32_t part) {
+        part_of.insert(part_of.end(), last - first, part);
+      });
+      all_.joined_parts = graph_.patchCount();
+    }
+    parts_.resize(all_.joined_parts);
   }
-  parts_.assign(same ? outcome.patches.size() : graph_.patchCount(), Part());
-  part_of_patch_.assign(outcome.patches.size(), 0);
-  for (std::size_t i = 0; i < current_.size(); ++i) {
-    const std::uint32_t part = part_of_[i];
+  std::uint32_t last_part = NO_PATCH;
+  std::uint64_t last_id = 0;
+  for (std::size_t i = 0; i < old_; ++i) {
+    const std::uint32_t part = part_of[i];
     const std::uint64_t id = all_.known[i].id;
-    std::vector<std::uint64_t>& before = parts_[part].before;
-    if (id != 0 && (before.empty() || before.back() != id)) before.push_back(id);
-    if (current_[i] != NO_PATCH) part_of_patch_[current_[i]] = part;
+    if (id == last_id && part == last_part) continue;
+    parts_[last_part = part].before.push_back(last_id = id);
   }
+  part_of_patch_.resize(outcome.patches.size());
+  for (std::size_t s = 0; s < spots.size(); ++s) part_of_patch_[spots[s].patch] = part_of[at_[s]];
   for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
     const Patch& patch = outcome.patches[p];
     Part& part = parts_[part_of_patch_[p]];
@@ -388,51 +404,54 @@ void PatchTracker::begin(Outcome& outcome) {
   }
 }
 
-/// The step becomes the trace, without what has not touched for longer than the gap.
+/// The step becomes the trace.
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
-  alive_.clear();
-  for (auto& [id, living] : living_) living.unexpected = false;
-  std::uint64_t unexpected_id = 0;  // the last one that was told so
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < current_.size(); ++i) {
-    const TouchGraph::Spot& spot = all_.spots[i];
-    // Numbers, not the whole: a copy of what was just written in parts would wait for it.
-    std::uint64_t id = all_.known[i].id;
-    std::int64_t last_ns = all_.known[i].last_ns;
-    bool expected = spot.expected;
-    const std::int64_t clock_ns = spot.body[1] == OBSTACLE_BODY ? map_clock_ns_ : mesh_clock_ns_;
-    if (current_[i] != NO_PATCH) last_ns = clock_ns;
-    if (static_cast<double>(clock_ns - last_ns) > gap_s * 1e9) continue;
-    Part& part = parts_[part_of_[i]];
-    if (part.touches) {
-      id = part.id;
-      // All of it is expected now: what was not, when other things were expected, is over.
-      expected = expected || (expectsOtherwise() && !part.isUnexpected());
-      part.lasts_unexpected = part.lasts_unexpected || !expected;
-    } else {
-      if (alive_.empty() || alive_.back() != id) alive_.push_back(id);
-      if (!expected && id != unexpected_id) living_.at(unexpected_id = id).unexpected = true;
-    }
-    if (kept != i) all_.spots[kept] = spot;
-    all_.spots[kept].expected = expected;
-    all_.known[kept].id = id;
-    all_.known[kept++].last_ns = last_ns;
-  }
-  all_.resize(kept);
+  const auto changes = [this](const Part& part) { return changesHands(part); };
+  if (forgot_burst_ || std::any_of(parts_.begin(), parts_.end(), changes)) askAllSpots();
+  for (std::size_t i = old_; i < all_.size(); ++i) all_.known[i].id = parts_[all_.part_of[i]].id;
   std::swap(all_, trace_);
+  const auto gap_ns = static_cast<std::int64_t>(std::min(gap_s * 1e9, 0x1p62));
+  for (Clock* const clock : {&mesh_clock_, &map_clock_}) {
+    clock->kept_from_ns = std::max(clock->kept_from_ns, clock->now_ns - gap_ns);
+  }
   for (auto& [id, living] : living_) {
-    const bool seen = living.body[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
-    if (seen && living.released_ns == UNKNOWN_NS) living.released_ns = outcome.start_ns;
+    if (clockOf(living.body).sees && living.released_ns == UNKNOWN_NS) living.released_ns = outcome.start_ns;
   }
   for (const Part& part : parts_) {
     if (!part.touches) continue;
     Living& living = living_.at(part.id);
     living.touched_ns = std::max(living.touched_ns, outcome.stampBefore(part.toc_lower));
     living.released_ns = UNKNOWN_NS;
-    living.unexpected = living.unexpected || part.lasts_unexpected;
-    alive_.push_back(part.id);
+    living.last_ns = clockOf(part.body).now_ns;
+    if (part.isUnexpected()) living.last_unexpected_ns = living.last_ns;
   }
-  std::sort(alive_.begin(), alive_.end());
+  for (auto& [id, living] : living_) {
+    if (lasts(living.body, living.last_ns)) living.unexpected = lasts(living.body, living.last_unexpected_ns);
+  }
+}
+
+/// Do old spots of the part get another identity, or may what was not expected of them be so now?
+bool PatchTracker::changesHands(const Part& part) const {
+  const bool has_others = part.before.size() > 1 || (part.before.size() == 1 && part.before[0] != part.id);
+  return part.touches && (has_others || !part.isUnexpected());
+}
+
+/// What is known of living patches is known anew, from each spot. In most steps remember() needs only what touches.
+void PatchTracker::askAllSpots() {
+  for (auto& [id, living] : living_) living.last_ns = living.last_unexpected_ns = NEVER;
+  Living* living = nullptr;
+  std::uint64_t last_id = 0;
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    TouchGraph::Spot& spot = all_.spots[i];
+    Known& known = all_.known[i];
+    const Part& part = parts_[all_.part_of[i]];
+    if (part.touches) known.id = part.id;
+    // All of it is expected now: what was not, when other things were expected, is over.
+    if (part.touches && expectsOtherwise() && !part.isUnexpected()) spot.expected = true;
+    if (known.id != last_id) living = &living_.at(last_id = known.id);
+    living->last_ns = std::max(living->last_ns, known.last_ns);
+    if (!spot.expected) living->last_unexpected_ns = std::max(living->last_unexpected_ns, known.last_ns);
+  }
 }
 
 void PatchTracker::endWhatIsGone(Outcome& outcome) {
@@ -444,7 +463,7 @@ void PatchTracker::endWhatIsGone(Outcome& outcome) {
   ends.reserve(living_.size());
   outcome.patch_events.reserve(outcome.patch_events.size() + living_.size());  // what is gone is told of
   for (auto at = living_.begin(); at != living_.end();) {
-    if (std::binary_search(alive_.begin(), alive_.end(), at->first)) {
+    if (lasts(at->second.body, at->second.last_ns)) {
       ++at;
       continue;
     }
@@ -455,6 +474,7 @@ void PatchTracker::endWhatIsGone(Outcome& outcome) {
     }
     at = living_.erase(at);
   }
+  if (living_.empty()) trace_.clear();
   outcome.patch_events.insert(outcome.patch_events.begin(), ends.begin(), ends.end());
 }
 

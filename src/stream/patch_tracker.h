@@ -14,7 +14,8 @@
 namespace dccd {
 
 /// Keeps what touched within the last patch_gap_s. What belongs together by that is one living patch, so that one
-/// which noise takes apart, or lets go of, for a moment stays one. Its memory is what touched in that time.
+/// which noise takes apart, or lets go of, for a moment stays one. Its memory is what touched in that time before the
+/// last step in which anything did.
 class PatchTracker {
  public:
   static constexpr std::size_t ALL = std::numeric_limits<std::size_t>::max();
@@ -35,34 +36,49 @@ class PatchTracker {
   void tell(Outcome& outcome);
 
  private:
+  static constexpr std::int64_t NEVER = std::numeric_limits<std::int64_t>::min();
   struct Living {
     std::array<std::uint16_t, 2> body{0, 0};
     PatchBeginning beginning = PatchBeginning::NEW;
     StampNs began_from_ns = UNKNOWN_NS, began_to_ns = UNKNOWN_NS;
     StampNs touched_ns = UNKNOWN_NS;   // it was still there
     StampNs released_ns = UNKNOWN_NS;  // it no longer was; UNKNOWN_NS: it was not seen apart since
-    bool unexpected = false;           // something of it that lasts is not expected
+    // By the clock of its partner: when the last of its spots was touched, and the last of those not expected.
+    std::int64_t last_ns = NEVER, last_unexpected_ns = NEVER;
+    bool unexpected = false;  // something of it that lasts is not expected, or was when the last of it was forgotten
   };
   /// What is known of a spot (PatchSpot) of a living patch.
   struct Known {
     std::uint64_t id = 0;
-    std::int64_t last_ns = 0;  // by the clock of its partner
+    std::int64_t last_ns = NEVER;  // by the clock of its partner
   };
-  /// Spots that touched; each pair of vertices is there once.
+  /// Spots that touched; each pair of vertices is there once. Those at one vertex are a list, the newest first.
   struct Trace {
     std::vector<TouchGraph::Spot> spots;
     std::vector<Known> known;
-    void resize(std::size_t size);
-    void push(const TouchGraph::Spot& spot, const Known& is) {
-      spots.push_back(spot);
-      known.push_back(is);
-    }
+    std::vector<std::uint32_t> before;   // per spot: the one before it at its vertex; NO_INDEX
+    std::vector<std::uint32_t> last_at;  // per vertex; NO_INDEX
+    std::vector<std::uint32_t> part_of;  // per spot
+    std::size_t joined_parts = 0;        // to so many they are joined; 0: not since one came or went
+    std::size_t size() const { return spots.size(); }
+    /// The spot there; a new one if there is none.
+    std::uint32_t at(Index vertex, Index across, const std::array<std::uint16_t, 2>& body);
+    /// Forgets all others. isKept(spot, known).
+    template <class F>
+    void keep(const F& isKept);
+    void clear();
+    void numberVertices(std::size_t count);  // those of the spots have other numbers than before
+  };
+  /// Time that was seen whole: nothing ends in what was not.
+  struct Clock {
+    std::int64_t now_ns = 0;
+    std::int64_t kept_from_ns = NEVER;  // what touched before is forgotten
+    bool sees = false;                  // in this step
   };
   /// What touches and what did, between the same areas.
   struct Part {
     std::uint64_t id = 0;
-    bool touches = false;           // in this step
-    bool lasts_unexpected = false;  // a spot of it that is remembered is not expected
+    bool touches = false;  // in this step
     std::size_t size = 0;
     std::vector<std::uint64_t> before;  // identities of its touches, ascending, each once
     double toc_lower = 1, toc_upper = 1;
@@ -87,15 +103,21 @@ class PatchTracker {
   void tellNews(Outcome& outcome) const;
   void goOn(const Outcome& outcome);
   void remember(double gap_s, const Outcome& outcome);
+  bool changesHands(const Part& part) const;
+  void askAllSpots();
+  const Clock& clockOf(const std::array<std::uint16_t, 2>& body) const {
+    return body[1] == OBSTACLE_BODY ? map_clock_ : mesh_clock_;
+  }
+  bool lasts(const std::array<std::uint16_t, 2>& body, std::int64_t last_ns) const {
+    return last_ns >= clockOf(body).kept_from_ns;
+  }
   void endWhatIsGone(Outcome& outcome);
   PatchEvent eventOf(PatchEventKind kind, std::uint64_t id) const;
 
   std::map<std::uint64_t, Living> living_;
   Trace trace_;
   std::uint64_t next_id_ = 1;
-  // Time that was seen whole, with the map and without: nothing ends in what was not.
-  std::int64_t mesh_clock_ns_ = 0, map_clock_ns_ = 0;
-  bool mesh_seen_ = false, map_seen_ = false;  // in this step
+  Clock mesh_clock_, map_clock_;  // of what touches the map, the second
   std::vector<Expectation> expected_;
   std::uint64_t expectations_ = 0, followed_expectations_ = 0;  // how often they changed: now, in the last step
   /// Partners of which a patch was all expected until a seam cut it off, and how often expectations had changed then.
@@ -108,16 +130,12 @@ class PatchTracker {
 
   // Buffers of a step.
   TouchGraph graph_;
-  Trace all_;                           // the trace, then what is new in the step
-  bool forgot_burst_ = false;           // the trace is not in all_
-  std::vector<std::uint32_t> current_;  // per one of these its patch in the step; NO_PATCH: none
-  std::vector<std::uint32_t> part_of_;  // per one of these
-  std::vector<std::uint32_t> last_at_;  // per vertex: the last one of these there; NO_INDEX
-  std::vector<std::uint32_t> before_;   // per one of these: the one before it at the same vertex
-  bool half_merged_ = false;            // a merge has not come to its end, and last_at_ is not as new
+  Trace all_;                      // the trace, then what is new in the step
+  std::size_t old_ = 0;            // how much of it is the trace
+  bool forgot_burst_ = false;      // the trace is not in all_
+  std::vector<std::uint32_t> at_;  // per spot of the step, its place in all_
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
-  std::vector<std::uint64_t> alive_;  // ascending
 };
 
 }  // namespace dccd

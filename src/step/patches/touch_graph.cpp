@@ -165,7 +165,7 @@ void TouchGraph::findAreasOf(std::size_t body) {
     Index root = area_[vertex] = vertex;
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
-      if (!is_touched_[other]) continue;
+      if (!is_touched_[other] || area_[other] == root) continue;
       const Index other_root = areaRoot(other);
       area_[std::max(root, other_root)] = std::min(root, other_root);
       root = std::min(root, other_root);
@@ -185,8 +185,9 @@ void TouchGraph::findChanges(const TouchGroup& group, std::uint32_t first, std::
   std::array<Index, 2> areas{NO_INDEX, NO_INDEX};
   for (std::uint32_t t = first; t < last; ++t, vertex += size) {
     const Index one = area[vertex[0]], other = area[vertex[second]];
-    if (one == areas[0] && other == areas[1]) continue;
-    areas = {one, other};
+    const Index low = std::min(one, other), high = std::max(one, other);
+    if (low == areas[0] && high == areas[1]) continue;
+    areas = {low, high};
     changes.push_back({t, areas});
   }
 }
@@ -213,7 +214,7 @@ void TouchGraph::nameComponents(std::size_t first, std::size_t last, const Paral
     runs_of_[by_partners_[g]][0] = runs_.size();
     for (std::size_t p = 0; p < pieces; ++p) {
       for (const Change& change : changes_[p]) {
-        const auto [low, high] = std::minmax(change.areas[0], change.areas[1]);
+        const auto [low, high] = change.areas;
         const std::uint64_t areas = std::uint64_t{low} << 32 | high;
         if (areas == last_areas) continue;
         last_areas = areas;

@@ -96,7 +96,7 @@ class TouchGraph {
   /// The first touch of those of one group that come one after the other and are between the same two areas.
   struct Change {
     std::uint32_t first;
-    std::array<Index, 2> areas;
+    std::array<Index, 2> areas;  // ascending
   };
 
   template <class T>

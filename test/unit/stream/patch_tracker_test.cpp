@@ -294,6 +294,18 @@ TEST(PatchTracker, WhatComesBackWithinTheGapIsTheSame) {
   }
 }
 
+TEST(PatchTracker, AnEndSaysWhetherAllOfItWasExpected) {
+  for (const bool expects : {false, true}) {
+    MonitorOptions options;
+    if (expects) options.detector.expected.resize(1);
+    if (expects) options.detector.expected[0].partners[1].body = OBSTACLE_BODY;
+    ClothOnTable stream(5, 5, options);
+    for (int k = 0; k < 20; ++k) stream.at(k > 0 && k < 4 ? 0 : 0.01);
+    ASSERT_EQ(stream.text(), "BEGAN 1, ENDED 1");
+    for (const PatchEvent& event : stream.events()) EXPECT_EQ(event.expected, expects) << toString(event.kind);
+  }
+}
+
 TEST(PatchTracker, PredictionsAndChecksLeaveItAloneAndKnowWhatLives) {
   const auto run = [](bool asks) {
     MonitorOptions options;
