@@ -42,12 +42,14 @@ ParameterReader::ParameterReader(ParameterTree tree, std::string path)
 
 void ParameterReader::fail(const std::string& name, const std::string& what) const {
   const auto member = tree_.members.find(name);
-  const int line = member == tree_.members.end() || member->second.line == 0 ? tree_.line : member->second.line;
+  const bool is_there = member != tree_.members.end();
+  const int line = is_there ? member->second.line : tree_.line;
+  const bool is_option = is_there && line == 0;  // of a command line, put beside what the file says
   std::string full = path_ + name;
   if (name.empty() && !full.empty() && full.back() == '/') full.pop_back();
-  const std::string where = tree_.file.empty() ? "parameter "
-                            : line == 0        ? tree_.file + ": "
-                                               : tree_.file + ":" + std::to_string(line) + ": ";
+  const std::string where = tree_.file.empty() || is_option ? "parameter "
+                            : line == 0                     ? tree_.file + ": "
+                                                            : tree_.file + ":" + std::to_string(line) + ": ";
   throw ParameterError(where + full + (full.empty() ? "" : " ") + what);
 }
 
@@ -58,6 +60,7 @@ void ParameterReader::failKind(const std::string& name, const ParameterTree& val
 const ParameterTree& ParameterReader::raw(const std::string& name) {
   static const ParameterTree UNSET;
   known_.insert(name);
+  all_known_->insert(path_ + name);
   const auto member = tree_.members.find(name);
   return member == tree_.members.end() ? UNSET : member->second;
 }
@@ -216,7 +219,9 @@ ParameterReader ParameterReader::below(const ParameterTree& tree, const std::str
   ParameterTree section = tree;
   section.file = tree_.file;
   if (section.line == 0) section.line = tree_.line;
-  return {std::move(section), path_ + name + "/"};
+  ParameterReader reader(std::move(section), path_ + name + "/");
+  reader.all_known_ = all_known_;
+  return reader;
 }
 
 std::vector<ParameterReader> ParameterReader::sections(const std::string& name) {
@@ -239,11 +244,21 @@ std::vector<std::string> ParameterReader::names() const {
   return result;
 }
 
+/// One of that very name in a section below, else the nearest at this level.
+std::string ParameterReader::nearestTo(const std::string& name) const {
+  const std::string ending = "/" + name;
+  for (const std::string& full : *all_known_) {
+    const bool ends =
+        full.size() >= ending.size() && full.compare(full.size() - ending.size(), ending.size(), ending) == 0;
+    if (ends && full.compare(0, path_.size(), path_) == 0) return full;
+  }
+  return path_ + nearestName(name, std::vector<std::string>(known_.begin(), known_.end()));
+}
+
 void ParameterReader::finish() const {
   for (const std::string& name : names()) {
     if (known_.count(name)) continue;
-    fail(name, "is not known; nearest is " + path_ +
-                   nearestName(name, std::vector<std::string>(known_.begin(), known_.end())));
+    fail(name, "is not known; nearest is " + nearestTo(name));
   }
 }
 

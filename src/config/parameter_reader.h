@@ -3,6 +3,7 @@
 // files are read by this one reader.
 #pragma once
 
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -72,8 +73,11 @@ class ParameterReader {
   ParameterTree tree_;
   std::string path_;
   std::set<std::string> known_;
+  // In full, here and in the sections around and below.
+  std::shared_ptr<std::set<std::string>> all_known_ = std::make_shared<std::set<std::string>>();
 
   const ParameterTree& needed(const std::string& name, const std::string& what);
+  std::string nearestTo(const std::string& name) const;
   [[noreturn]] void failKind(const std::string& name, const ParameterTree& value, const std::string& needed) const;
   double numberOf(const ParameterTree& value, const std::string& name, double min, double max) const;
   int integerOf(const ParameterTree& value, const std::string& name, int min, int max) const;

@@ -34,7 +34,8 @@ std::string unescaped(const std::string& path) {
 std::string pathOf(const std::string& address) {
   const std::string package = "package://", file = "file://";
   if (address.compare(0, file.size(), file) == 0) return unescaped(address.substr(file.size()));
-  if (address.compare(0, package.size(), package) != 0) return address;
+  std::error_code ignored;
+  if (address.compare(0, package.size(), package) != 0) return std::filesystem::absolute(address, ignored).string();
   const std::size_t slash = address.find('/', package.size());
   const std::string name = address.substr(package.size(), slash - package.size());
   const std::string root = ros::package::getPath(name);

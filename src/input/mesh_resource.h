@@ -21,8 +21,8 @@ struct MeshResource {
   std::vector<Index> verticesOf(const std::string& group) const;
 };
 
-/// Where a file lies: a path, file:// or package:// address. Throws std::invalid_argument naming a package that is not
-/// found.
+/// Where a file lies, in full: of a path, file:// or package:// address. Throws std::invalid_argument naming a package
+/// that is not found.
 std::string pathOf(const std::string& address);
 
 /// The mesh of a rigid body: PLY, OBJ, STL or DAE. The triangles of the last two are welded by exact coordinates.

@@ -19,6 +19,7 @@ HeaderView readHeader(WireReader& wire) {
 namespace {
 
 constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
+constexpr std::size_t MOST_TOLD = 64;             // characters of a cloud's fields
 
 /// Bytes of a FLOAT32 or FLOAT64.
 std::size_t sizeOf(const CloudView::Coordinate& coordinate) { return coordinate.is_double ? 8 : 4; }
@@ -44,6 +45,7 @@ CloudView::Coordinate fieldOf(std::string_view name, std::size_t offset, std::ui
 }  // namespace
 
 void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud) {
+  if (names_.size() < MOST_TOLD) names_.append(names_.empty() ? "" : ", ").append(name.substr(0, MOST_TOLD));
   if (!extra_field_.empty() && name == extra_field_) {
     if (cloud.extra) throw WireError("there are two fields '" + extra_field_ + "'");
     cloud.extra = fieldOf(name, offset, datatype);
@@ -57,12 +59,15 @@ void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8
 
 void CloudFieldFinder::finish(const CloudView& cloud) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!found_[axis]) throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'");
+    if (!found_[axis])
+      throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'" + there());
   }
   if (!extra_field_.empty() && !cloud.extra) {
-    throw WireError("there is no field '" + extra_field_ + "', which parameter uncertainty/field names");
+    throw WireError("there is no field '" + extra_field_ + "', which parameter uncertainty/field names" + there());
   }
 }
+
+std::string CloudFieldFinder::there() const { return names_.empty() ? "; there are none" : "; there are: " + names_; }
 
 void checkStrides(CloudView& cloud, std::size_t bytes) {
   for (const CloudView::Coordinate& coordinate :

@@ -52,12 +52,15 @@ class CloudFieldFinder {
  public:
   explicit CloudFieldFinder(const std::string& extra_field) : extra_field_(extra_field) {}
   void add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud);
-  /// Throws WireError naming the field that is not there.
+  /// Throws WireError naming the field that is not there, and those that are.
   void finish(const CloudView& cloud) const;
 
  private:
   const std::string& extra_field_;
   std::array<bool, 3> found_{};
+  std::string names_;  // of the fields, as far as they are told
+
+  std::string there() const;
 };
 /// Throws WireError unless the coordinates lie side by side, those of every point within `bytes` of data. Corrects a
 /// row_step that contradicts data that are exactly height x width x point_step.

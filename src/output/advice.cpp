@@ -110,6 +110,9 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
       return "publish it on /tf or /tf_static for these stamps (see rosrun tf tf_echo), "
              "or set fixed_frame to a frame of the same tree";
     case StepStatus::NO_MAP:
+      // One that came is no matter of its rate, and may be a file.
+      if (reason.find(" was refused: ") != std::string::npos)
+        return "correct the map of " + map_source + ", or do without with effects/octomap: off";
       return "see rostopic hz " + map_source + ", or do without with effects/octomap: off";
     case StepStatus::NO_BODY:
       return "see rostopic hz of its topic; one that comes late needs a larger sync_timeout_s";

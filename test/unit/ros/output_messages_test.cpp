@@ -7,6 +7,7 @@
 #include <limits>
 #include <sstream>
 
+#include "output/advice.h"
 #include "output/patch_messages.h"
 
 namespace dccd {
@@ -237,6 +238,12 @@ TEST(State, ReasonIsEnoughByItself) {
       "not proved: no octomap has been received yet; checked without it; what touches did so when the step began: "
       "cloth and itself since the first look, 1 patch at 0.300 0.100 0.750; see rostopic hz /octomap, or do without "
       "with effects/octomap: off; the promise of ~safe_until was void: the map has new voxels");
+}
+
+// A file is on no topic, and what was refused did come.
+TEST(Advice, AMapThatWasRefusedIsToBeCorrected) {
+  EXPECT_EQ(adviceFor(StepStatus::NO_MAP, "the octomap was refused: box.stl: no header; checked without it", "box.stl"),
+            "correct the map of box.stl, or do without with effects/octomap: off");
 }
 
 /// Bytes as they go over the wire.

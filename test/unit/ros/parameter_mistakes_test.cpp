@@ -19,6 +19,9 @@ TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
       {"record_directory: steps", "~record_directory is not known; nearest is ~record_folder"},
       {"sensor_model: {mis: 0.3}", "~sensor_model/mis is not known; nearest is ~sensor_model/min"},
       {"clearance: {max: 1.0}", "~clearance/max is not known; nearest is ~clearance/max_m"},
+      {"rows: 20", "~rows is not known; nearest is ~topology/rows"},
+      {"bodies: {cloth: {topic: a, cols: 3}}",
+       "~bodies/cloth/cols is not known; nearest is ~bodies/cloth/topology/cols"},
   });
 }
 
@@ -145,6 +148,14 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"bodies: {seen: {motion: static, topology: {source: depth_image}}}",
        "cannot be chosen: no body is a stream of meshes"},
   });
+}
+
+// It was told of the file's first line.
+TEST(Parameters, WhatAnOptionPutsBesideAFileIsNotTheFiles) {
+  ParameterTree tree = parseYaml("fixed_frame: world\nmax_step_s: 1\n", "p.yaml");
+  tree.put("accuracy", "exat");
+  EXPECT_EQ(said<ParameterError>([&] { readConfig(tree, ""); }),
+            "parameter accuracy is 'exat', it must be one of conservative, exact; nearest is 'exact'");
 }
 
 TEST(Parameters, OfAFileTheLineIsNamed) {

@@ -120,7 +120,7 @@ TEST_F(Clouds, WhatCannotBecomePartOfTheMapIsSaid) {
   far.transform.translation.x = 4000;  // of the 3276.8 m that 0.1 m can span
   driven.transforms.setTransform(far, "test", true);
   const std::pair<sensor_msgs::PointCloud2, std::string> cases[] = {
-      {flat, "the cloud was refused: there is no field 'z'"},
+      {flat, "the cloud was refused: there is no field 'z'; there are: x, y"},
       {integers, "the cloud was refused: field 'x' has datatype 5; FLOAT32 (7) or FLOAT64 (8) is needed"},
       {cut, "the cloud was refused: 1 x 1601 points of 12 bytes do not fit into data of 100"},
       {nameless, "the cloud was refused: frame_id is empty; it is to name the sensor's frame"},
