@@ -136,7 +136,7 @@ void PatchMaker::addContacts(const Outcome& outcome, std::size_t first, std::siz
     if (self) part.first_normal = of_patch == first ? placeOf(first).normal : normalOf(outcome, contacts[of_patch]);
   }
   part.contacts += static_cast<std::uint32_t>(last - first);
-  Part sum = part;  // in registers
+  Part& sum = part;
   for (std::size_t c = first; c < last; ++c) {
     const Contact& contact = contacts[c];
     const Place at = placeOf(c);
@@ -158,7 +158,6 @@ void PatchMaker::addContacts(const Outcome& outcome, std::size_t first, std::siz
     sum.expected += contact.expected;
     if (!contact.expected) (contact.initial ? sum.unexpected.is_initial : sum.unexpected.is_new) = true;
   }
-  part = sum;
 }
 
 void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
