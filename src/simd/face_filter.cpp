@@ -173,7 +173,8 @@ HWY_INLINE Flags pairBlock(const float* HWY_RESTRICT block, float largest_coordi
 }
 
 FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                         const uint32_t* HWY_RESTRICT slots, size_t count, uint32_t* HWY_RESTRICT left) {
+                         const uint32_t* HWY_RESTRICT slots, const uint8_t* HWY_RESTRICT asked_of, size_t count,
+                         uint32_t* HWY_RESTRICT left) {
   const hn::RebindToUnsigned<DF> du;
   const size_t lanes = hn::Lanes(DF());
   HWY_ALIGN_MAX float blocks[2][PAIR_POINTS * PAIR_POINT_SIZE] = {};
@@ -186,7 +187,8 @@ FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const
     for (size_t lane = 0; lane < n; ++lane) {
       const size_t f = slots[2 * (first + lane)], g = slots[2 * (first + lane) + 1];
       gatherPair(vertices.positions, corners(a, f), corners(b, g), placeOf(lane), blocks[block]);
-      asked[block][lane] = uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
+      asked[block][lane] = asked_of ? uint32_t{asked_of[first + lane]}
+                                    : uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
       result.asked += hwy::PopCount(asked[block][lane]);
     }
     for (size_t lane = n; lane < lanes; ++lane) asked[block][lane] = 0;
@@ -325,8 +327,9 @@ void moveNear(const double* positions, std::size_t count, const double* origin, 
   HWY_DYNAMIC_DISPATCH(MoveNear)(positions, count, origin, near);
 }
 FacesLeft facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                         const std::uint32_t* slots, std::size_t count, std::uint32_t* left) {
-  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, count, left);
+                         const std::uint32_t* slots, const std::uint8_t* asked, std::size_t count,
+                         std::uint32_t* left) {
+  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, asked, count, left);
 }
 void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views) {
   HWY_DYNAMIC_DISPATCH(FaceViews)(vertices, groups, count, views);
