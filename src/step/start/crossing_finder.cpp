@@ -165,16 +165,22 @@ void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std
       fan_asked_.resize(2 * (fan_pairs_ + n));
       fan_slots_.resize(2 * fan_asked_.size());
     }
-    const FaceOfFan& one = fan_[i];
+    const FaceOfFan one = fan_[i], *const fan = fan_.data();
+    // In registers: what a byte is written to might be these members.
+    std::uint32_t* slots = fan_slots_.data() + 2 * fan_pairs_;
+    std::uint8_t* asked = fan_asked_.data() + fan_pairs_;
     for (std::uint32_t j = i + 1; j < n; ++j) {  // without a branch on what nothing foretells
-      const FaceOfFan& other = fan_[j];
-      const unsigned asked = one.edge | other.edge << simd::SECOND_EDGES_SHIFT;
-      fan_slots_[2 * fan_pairs_] = one.slot;
-      fan_slots_[2 * fan_pairs_ + 1] = other.slot;
-      fan_asked_[fan_pairs_] = static_cast<std::uint8_t>(asked);
-      fan_pairs_ += (asked != 0) & (one.from != other.from) & (one.from != other.to) & (one.to != other.from) &
-                    (one.to != other.to);
+      const FaceOfFan& other = fan[j];
+      const unsigned edges = one.edge | other.edge << simd::SECOND_EDGES_SHIFT;
+      const std::size_t is_pair = (edges != 0) & (one.from != other.from) & (one.from != other.to) &
+                                  (one.to != other.from) & (one.to != other.to);
+      slots[0] = one.slot;
+      slots[1] = other.slot;
+      *asked = static_cast<std::uint8_t>(edges);
+      slots += 2 * is_pair;
+      asked += is_pair;
     }
+    fan_pairs_ = static_cast<std::size_t>(asked - fan_asked_.data());
   }
 }
 
@@ -206,6 +212,8 @@ bool CrossingFinder::searchFans(std::uint32_t body, std::size_t first, std::size
   const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
   for (std::size_t i = 0; i < other_turns_.size(); ++i) {
     const std::size_t soon = other_turns_[std::min(i + FETCHED_AHEAD, other_turns_.size() - 1)];
+    const std::size_t later = other_turns_[std::min(i + 2 * FETCHED_AHEAD, other_turns_.size() - 1)];
+    __builtin_prefetch(around.faces.slots.data() + around.faces.begin[later]);
     for (std::uint32_t f = around.faces.begin[soon]; f < around.faces.begin[soon + 1]; ++f) {
       __builtin_prefetch(faces.feature(around.faces.slots[f]));
     }
