@@ -173,7 +173,8 @@ HWY_INLINE Flags pairBlock(const float* HWY_RESTRICT block, float largest_coordi
 }
 
 FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                         const uint32_t* HWY_RESTRICT slots, size_t count, uint32_t* HWY_RESTRICT left) {
+                         const uint32_t* HWY_RESTRICT slots, const uint8_t* HWY_RESTRICT asked_of, size_t count,
+                         uint32_t* HWY_RESTRICT left) {
   const hn::RebindToUnsigned<DF> du;
   const size_t lanes = hn::Lanes(DF());
   HWY_ALIGN_MAX float blocks[2][PAIR_POINTS * PAIR_POINT_SIZE] = {};
@@ -186,7 +187,8 @@ FacesLeft FacePairFilter(const NearVertices& vertices, const FacesView& a, const
     for (size_t lane = 0; lane < n; ++lane) {
       const size_t f = slots[2 * (first + lane)], g = slots[2 * (first + lane) + 1];
       gatherPair(vertices.positions, corners(a, f), corners(b, g), placeOf(lane), blocks[block]);
-      asked[block][lane] = uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
+      asked[block][lane] = asked_of ? uint32_t{asked_of[first + lane]}
+                                    : uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
       result.asked += hwy::PopCount(asked[block][lane]);
     }
     for (size_t lane = n; lane < lanes; ++lane) asked[block][lane] = 0;
@@ -215,8 +217,8 @@ constexpr size_t FACE_POINT_SIZE = 4 * GROUP;
 HWY_INLINE void viewBlock(const float* HWY_RESTRICT block, float largest_coordinate, uint32_t* HWY_RESTRICT views) {
   const DF d;
   const hn::RebindToUnsigned<DF> du;
-  const Float3 p0 = loadPoint(d, block), p1 = loadPoint(d, block + FACE_POINT_SIZE);
-  const Float3 p2 = loadPoint(d, block + 2 * FACE_POINT_SIZE);
+  const Float3 p0 = loadLanes(block), p1 = loadLanes(block + FACE_POINT_SIZE);
+  const Float3 p2 = loadLanes(block + 2 * FACE_POINT_SIZE);
   const Float3 x{hn::Sub(p1.x, p0.x), hn::Sub(p1.y, p0.y), hn::Sub(p1.z, p0.z)};
   const Float3 y{hn::Sub(p2.x, p0.x), hn::Sub(p2.y, p0.y), hn::Sub(p2.z, p0.z)};
   const VF size = hn::Max(largest(x), largest(y));
@@ -243,15 +245,17 @@ HWY_INLINE void viewBlock(const float* HWY_RESTRICT block, float largest_coordin
 void FaceViews(const NearVertices& vertices, const uint32_t* HWY_RESTRICT groups, size_t count,
                uint32_t* HWY_RESTRICT views) {
   const hn::CappedTag<float, 4> d;
+  const size_t lanes = hn::Lanes(DF());
   HWY_ALIGN_MAX float blocks[2][3 * FACE_POINT_SIZE] = {};
   const auto fill = [&](size_t g) HWY_ATTR {
     const uint32_t* group = groups + g * 3 * GROUP;
     for (size_t lane = 0; g < count && lane < GROUP; ++lane) {
       if (group[lane] == UINT32_MAX) continue;
+      const size_t place = lane / lanes * lanes + placeOf(lane % lanes);
       for (size_t k = 0; k < 4; k += hn::Lanes(d)) {
         for (size_t i = 0; i < 3; ++i) {
           const auto x = hn::LoadU(d, vertices.positions + size_t{group[i * GROUP + lane]} * 4 + k);
-          hn::Store(x, d, blocks[g % 2] + i * FACE_POINT_SIZE + lane * 4 + k);
+          hn::Store(x, d, blocks[g % 2] + i * FACE_POINT_SIZE + place * 4 + k);
         }
       }
     }
@@ -260,7 +264,7 @@ void FaceViews(const NearVertices& vertices, const uint32_t* HWY_RESTRICT groups
   fill(0);
   for (size_t g = 0; g < count; ++g) {
     fill(g + 1);
-    for (size_t lane = 0; lane < GROUP; lane += hn::Lanes(DF())) {
+    for (size_t lane = 0; lane < GROUP; lane += lanes) {
       viewBlock(blocks[g % 2] + lane * 4, vertices.largest, views + g * GROUP + lane);
     }
   }
@@ -325,8 +329,9 @@ void moveNear(const double* positions, std::size_t count, const double* origin, 
   HWY_DYNAMIC_DISPATCH(MoveNear)(positions, count, origin, near);
 }
 FacesLeft facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                         const std::uint32_t* slots, std::size_t count, std::uint32_t* left) {
-  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, count, left);
+                         const std::uint32_t* slots, const std::uint8_t* asked, std::size_t count,
+                         std::uint32_t* left) {
+  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, asked, count, left);
 }
 void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views) {
   HWY_DYNAMIC_DISPATCH(FaceViews)(vertices, groups, count, views);

@@ -62,14 +62,14 @@ struct FacesLeft {
   std::size_t left;   ///< pairs with any such bit
 };
 
-/// slots: of A in a and of B in b for each pair, count <= MOST_FACE_PAIRS. Faces that share a corner may be asked about
-/// the edges that do not end there: nothing of them is called certain. left: of
-/// those pairs with any such bit of an edge that is asked about, in order, the place << PLACE_SHIFT and these bits; has
-/// room for PAIRS_BEHIND more than count.
+/// slots: of A in a and of B in b for each pair, count <= MOST_FACE_PAIRS. asked: of each pair, the bits of the edges
+/// that are asked about; null: those of the views. Faces that share a corner may be asked about the edges that do not
+/// end there: nothing of them is called certain. left: of those pairs with any such bit of an edge that is asked about,
+/// in order, the place << PLACE_SHIFT and these bits; has room for PAIRS_BEHIND more than count.
 constexpr unsigned PLACE_SHIFT = 16;
 constexpr std::size_t MOST_FACE_PAIRS = 1 << 16, PAIRS_BEHIND = 16;
 FacesLeft facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
-                         const std::uint32_t* slots, std::size_t count, std::uint32_t* left);
+                         const std::uint32_t* slots, const std::uint8_t* asked, std::size_t count, std::uint32_t* left);
 
 /// Bits of how a face is seen: TURNS_LEFT << k and TURNS_RIGHT << k along axis k; RISES << (8 k + c): from the corner
 /// after corner c to the one after that it goes from low to not low.

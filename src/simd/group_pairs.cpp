@@ -69,10 +69,12 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 #endif
 
 // Which pairs of nodes are not reported, of those whose bounds meet: from() takes a mask of the lanes of the group
-// opposite node i and returns those that stay. FIRST: it is asked before the bounds are.
+// opposite node i and returns those that stay. FIRST: it is asked before the bounds are, and nodesWith() of which nodes
+// any stay.
 struct LeaveNoneOut {
   static constexpr bool FIRST = true;
   HWY_INLINE uint32_t from(uint32_t, uint32_t mask) const { return mask; }
+  HWY_INLINE uint32_t nodesWith(uint32_t) const { return ~0u; }
 };
 
 // Features of A and B vertices that share one: their vertices lane by lane.
@@ -131,6 +133,16 @@ struct LeaveKnownOut {
   static constexpr bool FIRST = true;
   const uint16_t* HWY_RESTRICT lanes;  // by node
   HWY_INLINE uint32_t from(uint32_t i, uint32_t mask) const { return mask & ~uint32_t{lanes[i]}; }
+  // Of which nodes from() leaves any lane of a mask.
+  HWY_INLINE uint32_t nodesWith(uint32_t mask) const {
+    const hn::CappedTag<uint16_t, GROUP> d;
+    const auto all = hn::Set(d, static_cast<uint16_t>(mask));
+    uint32_t nodes = 0;
+    for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
+      nodes |= bitsOf(d, hn::Ne(hn::AndNot(hn::Load(d, lanes + part), all), hn::Zero(d))) << part;
+    }
+    return nodes;
+  }
 };
 
 HWY_INLINE const LanePairs& pairsOf(const KnownPairs& known, uint32_t g, uint32_t h) {
@@ -146,8 +158,7 @@ HWY_INLINE const LanePairs& pairsOf(const KnownPairs& known, uint32_t g, uint32_
   return NONE;
 }
 
-// What is left out of the pairs of groups, one after another: of() of the one that came last to next() but one. The
-// first of them comes before that.
+// What is left out of the pairs of groups, one after another: of() of the one that came to next() two before the last.
 struct NoneOf {
   HWY_INLINE void next(uint32_t, uint32_t) {}
   HWY_INLINE LeaveNoneOut of(uint32_t, uint32_t, bool) const { return {}; }
@@ -162,14 +173,17 @@ struct AdjacentOf {
   }
 };
 
-// Looked up, and fetched from far away, while the pair before is tested.
+// Looked up, and fetched from far away, while the two pairs before are tested.
 struct KnownOf {
   const KnownPairs& known;
-  const LanePairs *now = nullptr, *soon = nullptr;
+  const uint32_t* HWY_RESTRICT vertices;  // of faces, which who reads the pairs needs next
+  const LanePairs *now = nullptr, *soon = nullptr, *later = nullptr;
   HWY_INLINE void next(uint32_t g, uint32_t h) {
     now = soon;
-    soon = &pairsOf(known, g, h);
-    hwy::Prefetch(soon);
+    soon = later;
+    later = &pairsOf(known, g, h);
+    hwy::Prefetch(later);
+    for (size_t k = 0; k < 3; ++k) hwy::Prefetch(vertices + (size_t{h} * 3 + k) * GROUP);
   }
   HWY_INLINE LeaveKnownOut of(uint32_t, uint32_t, bool by_rows) const { return {by_rows ? now->rows : now->columns}; }
 };
@@ -196,14 +210,15 @@ HWY_INLINE uint32_t* testNodes(const NodesAndLanes& pair, bool same, Diagonal di
   const auto leave_out = left_out.of(pair.g, pair.h, pair.by_rows);
   constexpr bool LEAVES_OUT_FIRST = decltype(leave_out)::FIRST;
   uint32_t met[GROUP], to_write = 0;
-  for (uint32_t left = pair.nodes; left; left &= left - 1) {
+  uint32_t nodes = pair.nodes;
+  if constexpr (LEAVES_OUT_FIRST) nodes &= leave_out.nodesWith(pair.lanes);
+  for (uint32_t left = nodes; left; left &= left - 1) {
     const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
     uint32_t mask = pair.lanes;
     // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     if (LEAVES_OUT_FIRST) mask = leave_out.from(i, mask);
-    if (mask == 0) continue;
     mask &= group.meets(pair.soa_of_nodes + soaIndex(0, i), pair.soa_of_nodes + RECORD * GROUP + soaIndex(0, i));
     if (WRITES_LATER) {
       met[i] = LEAVES_OUT_FIRST ? mask : leave_out.from(i, mask);
@@ -252,7 +267,11 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
                             size_t capacity, size_t* consumed) {
   uint32_t* o = out;
   size_t p = 0;
-  if (count > 0) left_out.next(group_pairs[0], group_pairs[1]);
+  const auto fetch = [&](size_t i) HWY_ATTR {
+    i = HWY_MIN(i, count - 1);
+    left_out.next(group_pairs[2 * i], group_pairs[2 * i + 1]);
+  };
+  for (size_t i = 0; count > 0 && i < 2; ++i) fetch(i);
   // There is room for every pair of a pair of groups, so that testPair() need not look.
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
@@ -260,8 +279,7 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
       prefetch<T0_ONLY>(a, group_pairs[2 * p + 4]);
       prefetch<T0_ONLY>(b, group_pairs[2 * p + 5]);
     }
-    const size_t next = p + 1 < count ? p + 1 : p;
-    left_out.next(group_pairs[2 * next], group_pairs[2 * next + 1]);
+    fetch(p + 2);
     o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, left_out, o);
   }
   *consumed = p;
@@ -293,8 +311,8 @@ size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_
 
 size_t TestOtherPairs(const GroupsView& tree, const uint32_t* group_pairs, size_t count, const KnownPairs& left_out,
                       uint32_t* out, size_t capacity, size_t* consumed) {
-  return testPairs<true>(tree, tree, group_pairs, count, true, Diagonal::STRICT_UPPER, KnownOf{left_out}, out, capacity,
-                         consumed);
+  return testPairs<true>(tree, tree, group_pairs, count, true, Diagonal::ALL, KnownOf{left_out, tree.vertices}, out,
+                         capacity, consumed);
 }
 
 }  // namespace HWY_NAMESPACE

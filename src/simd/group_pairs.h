@@ -39,13 +39,15 @@ struct alignas(64) LanePairs {
 };
 
 /// Pairs of features of one tree, by their groups: those of group g and group others[k], which is not smaller, are
-/// pairs[k], k from begin[g] to begin[g + 1]. Behind the last one 8 more of others can be read.
+/// pairs[k], k from begin[g] to begin[g + 1]. Of a group with itself rows alone are looked at, and a pair stands there
+/// in both orders. Behind the last one 8 more of others can be read.
 struct KnownPairs {
   const std::uint32_t *begin, *others;
   const LanePairs* pairs;
 };
 
-/// testGroupPairs() of a tree with itself, STRICT_UPPER, at t0 alone, without those pairs.
+/// testGroupPairs() of a tree with itself, ALL, at t0 alone, without those pairs. A row, or column, of which nothing is
+/// left is no work.
 std::size_t testOtherPairs(const GroupsView& tree, const std::uint32_t* group_pairs, std::size_t count,
                            const KnownPairs& left_out, std::uint32_t* out, std::size_t capacity, std::size_t* consumed);
 

@@ -132,8 +132,8 @@ struct FaceBatch {
     }
   }
   Vec3 at(std::size_t i) const { return Eigen::Map<const Vec3>(vertices[i].t0); }
-  /// Of each pair, all bits.
-  std::vector<std::uint32_t> bits() const {
+  /// Of each pair, all bits; asked: of the edges that are asked about alone.
+  std::vector<std::uint32_t> bits(const std::vector<std::uint8_t>* asked = nullptr) const {
     double middle[4] = {}, largest = 0;
     for (int k = 0; k < 3; ++k) {
       const auto [low, high] =
@@ -146,8 +146,8 @@ struct FaceBatch {
     simd::moveNear(vertices[0].t0, vertices.size(), middle, near.data());
     std::vector<std::uint32_t> left(slots.size() / 2 + simd::PAIRS_BEHIND), all(slots.size() / 2, 0);
     const simd::FacesView view{corners.data(), edges.data()};
-    left.resize(simd::facePairFilter({near.data(), simd::largestNear(largest)}, view, view, slots.data(), all.size(),
-                                     left.data())
+    left.resize(simd::facePairFilter({near.data(), simd::largestNear(largest)}, view, view, slots.data(),
+                                     asked ? asked->data() : nullptr, all.size(), left.data())
                     .left);
     for (const std::uint32_t pair : left) all[pair >> simd::PLACE_SHIFT] = pair & ((1u << simd::PLACE_SHIFT) - 1);
     return all;
@@ -170,6 +170,12 @@ TEST(StartCrossing, EdgesOfPairsOfFacesAreAsTheOracleSays) {
     }
     for (const auto& [which, batch] : by_size) {
       const std::vector<std::uint32_t> bits = batch.bits();
+      std::vector<std::uint8_t> asked(bits.size());
+      for (std::uint8_t& edges : asked) edges = static_cast<std::uint8_t>(draw(0, 63));
+      const std::vector<std::uint32_t> of_asked = batch.bits(&asked);
+      for (std::size_t i = 0; i < bits.size(); ++i) {
+        ASSERT_EQ(of_asked[i], bits[i] & (asked[i] | unsigned{asked[i]} << simd::MEETS_SHIFT));
+      }
       for (std::size_t i = 0; i < bits.size(); ++i) {
         for (std::size_t edge = 0; edge < 6; ++edge) {
           const std::size_t a = 6 * i + (edge < 3 ? 0 : 3), b = 6 * i + (edge < 3 ? 3 : 0);

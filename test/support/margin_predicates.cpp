@@ -99,8 +99,8 @@ IsWrong judgeSegment(const MarginInput& input) {
     float near[6 * 4];
     simd::moveNear(points[0], 6, middle, near);
     std::uint32_t edges[1 + simd::PAIRS_BEHIND] = {};
-    simd::facePairFilter({near, simd::largestNear(largest)}, {CORNERS, ALL_EDGES}, {CORNERS, ALL_EDGES}, SLOTS, 1,
-                         edges);
+    simd::facePairFilter({near, simd::largestNear(largest)}, {CORNERS, ALL_EDGES}, {CORNERS, ALL_EDGES}, SLOTS, nullptr,
+                         1, edges);
     return meets ? (edges[0] & 1) == 0 : (edges[0] >> simd::MEETS_SHIFT & 1) != 0;
   };
 }

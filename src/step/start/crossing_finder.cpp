@@ -93,30 +93,30 @@ bool CrossingFinder::searchEdges(std::uint32_t edge_body, std::uint32_t face_bod
 }
 
 /// Of those edges of pairs of faces that are asked about: what certainly meets to found, what may to pairs_. asked:
-/// such bits of each pair; null: of an edge's faces the one that stands for it is asked. Returns how many edges these
-/// are then.
-std::size_t CrossingFinder::addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
-                                         const std::uint8_t* asked, std::vector<EdgeFace>& found) {
+/// such bits of each pair; null: of an edge's faces the one that stands for it is asked.
+void CrossingFinder::addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
+                                  const std::uint8_t* asked, std::vector<EdgeFace>& found) {
   const Neighbourhood &around_a = (*search_.neighbourhoods)[a], &around_b = (*search_.neighbourhoods)[b];
   const ClusterTree& faces_a = search_.scene->bodies()[a].tree(FeatureKind::FACE);
   const ClusterTree& faces_b = search_.scene->bodies()[b].tree(FeatureKind::FACE);
   face_pairs_.resize(CHUNK + simd::PAIRS_BEHIND);
   const auto [all_asked, left] =
       simd::facePairFilter(search_.vertices, {faces_a.leaves(false).vertices, around_a.owns.data()},
-                           {faces_b.leaves(false).vertices, around_b.owns.data()}, slots, n, face_pairs_.data());
+                           {faces_b.leaves(false).vertices, around_b.owns.data()}, slots, asked, n, face_pairs_.data());
+  tested_ += all_asked;
   work_ += n / FACE_PAIRS_A_TEST;
   for (std::size_t c = 0; c < left; ++c) {
     const std::uint32_t soon = face_pairs_[std::min(c + FETCHED_AHEAD, left - 1)] >> simd::PLACE_SHIFT;
     __builtin_prefetch(&around_a.own_edges[slots[2 * soon]]);
     __builtin_prefetch(&around_b.own_edges[slots[2 * soon + 1]]);
     const std::uint32_t i = face_pairs_[c] >> simd::PLACE_SHIFT, face = slots[2 * i], other = slots[2 * i + 1];
-    const unsigned wanted = asked ? asked[i] : EDGES, meeting = face_pairs_[c] >> simd::MEETS_SHIFT & wanted;
+    const unsigned meeting = face_pairs_[c] >> simd::MEETS_SHIFT & EDGES;
     for (unsigned edges = meeting; edges != 0; edges &= edges - 1) {
       const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
       found.push_back(bit < 3 ? EdgeFace{a, around_a.own_edges[face][bit], b, other}
                               : EdgeFace{b, around_b.own_edges[other][bit - 3], a, face});
     }
-    const unsigned unsure = face_pairs_[c] & wanted & ~meeting;
+    const unsigned unsure = face_pairs_[c] & EDGES & ~meeting;
     if (unsure == 0) continue;
     const Index *f = faces_a.lane<3>(face), *g = faces_b.lane<3>(other);
     for (std::size_t k = 0; k < 3; ++k) {  // only their copies in float were read
@@ -133,7 +133,6 @@ std::size_t CrossingFinder::addFacePairs(std::uint32_t a, std::uint32_t b, const
       }
     }
   }
-  return all_asked;
 }
 
 bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePair& trees,
@@ -142,7 +141,7 @@ bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePai
   const bool whole = stream_.run(trees, group_pairs, count, [&](const std::uint32_t* slots, std::size_t count) {
     for (const std::uint32_t* end = slots + 2 * count; slots != end;) {
       const std::size_t n = std::min(CHUNK, static_cast<std::size_t>(end - slots) / 2);
-      tested_ += addFacePairs(a, b, slots, n, nullptr, found);
+      addFacePairs(a, b, slots, n, nullptr, found);
       if (pairs_.size() >= CHUNK && !flush(found)) return false;
       slots += 2 * n;
     }
@@ -166,16 +165,22 @@ void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std
       fan_asked_.resize(2 * (fan_pairs_ + n));
       fan_slots_.resize(2 * fan_asked_.size());
     }
-    const FaceOfFan& one = fan_[i];
+    const FaceOfFan one = fan_[i], *const fan = fan_.data();
+    // In registers: what a byte is written to might be these members.
+    std::uint32_t* slots = fan_slots_.data() + 2 * fan_pairs_;
+    std::uint8_t* asked = fan_asked_.data() + fan_pairs_;
     for (std::uint32_t j = i + 1; j < n; ++j) {  // without a branch on what nothing foretells
-      const FaceOfFan& other = fan_[j];
-      const unsigned asked = one.edge | other.edge << simd::SECOND_EDGES_SHIFT;
-      fan_slots_[2 * fan_pairs_] = one.slot;
-      fan_slots_[2 * fan_pairs_ + 1] = other.slot;
-      fan_asked_[fan_pairs_] = static_cast<std::uint8_t>(asked);
-      fan_pairs_ += (asked != 0) & (one.from != other.from) & (one.from != other.to) & (one.to != other.from) &
-                    (one.to != other.to);
+      const FaceOfFan& other = fan[j];
+      const unsigned edges = one.edge | other.edge << simd::SECOND_EDGES_SHIFT;
+      const std::size_t is_pair = (edges != 0) & (one.from != other.from) & (one.from != other.to) &
+                                  (one.to != other.from) & (one.to != other.to);
+      slots[0] = one.slot;
+      slots[1] = other.slot;
+      *asked = static_cast<std::uint8_t>(edges);
+      slots += 2 * is_pair;
+      asked += is_pair;
     }
+    fan_pairs_ = static_cast<std::size_t>(asked - fan_asked_.data());
   }
 }
 
@@ -183,8 +188,6 @@ void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std
 bool CrossingFinder::flushFans(std::uint32_t body, std::vector<EdgeFace>& found) {
   for (std::size_t first = 0; first < fan_pairs_; first += CHUNK) {
     const std::size_t n = std::min(CHUNK, fan_pairs_ - first);
-    for (std::size_t i = first; i < first + n; ++i)
-      tested_ += static_cast<std::size_t>(__builtin_popcount(fan_asked_[i]));
     addFacePairs(body, body, fan_slots_.data() + 2 * first, n, fan_asked_.data() + first, found);
     if (!flush(found)) return false;
   }
@@ -209,6 +212,8 @@ bool CrossingFinder::searchFans(std::uint32_t body, std::size_t first, std::size
   const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
   for (std::size_t i = 0; i < other_turns_.size(); ++i) {
     const std::size_t soon = other_turns_[std::min(i + FETCHED_AHEAD, other_turns_.size() - 1)];
+    const std::size_t later = other_turns_[std::min(i + 2 * FETCHED_AHEAD, other_turns_.size() - 1)];
+    __builtin_prefetch(around.faces.slots.data() + around.faces.begin[later]);
     for (std::uint32_t f = around.faces.begin[soon]; f < around.faces.begin[soon + 1]; ++f) {
       __builtin_prefetch(faces.feature(around.faces.slots[f]));
     }

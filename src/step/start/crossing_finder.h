@@ -75,8 +75,8 @@ class CrossingFinder {
   void test(const double* positions, std::size_t first, std::size_t last, std::vector<EdgeFace>& found);
   bool flush(std::vector<EdgeFace>& found);
   bool flushFans(std::uint32_t body, std::vector<EdgeFace>& found);
-  std::size_t addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
-                           const std::uint8_t* asked, std::vector<EdgeFace>& found);
+  void addFacePairs(std::uint32_t a, std::uint32_t b, const std::uint32_t* slots, std::size_t n,
+                    const std::uint8_t* asked, std::vector<EdgeFace>& found);
   void addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex);
 
   Search search_;

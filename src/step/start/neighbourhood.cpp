@@ -48,14 +48,21 @@ void FacesSharing::build(const ClusterTree& faces, const SlotsAtVertex& at, Inde
 }
 
 void FacesSharing::leaveOut(const std::vector<std::uint8_t>& owns) {
-  std::vector<std::uint16_t> none(begin.size() - 1, 0);  // by groups: lanes
+  constexpr std::uint16_t ALL = 0xffff;
+  std::vector<std::uint16_t> none(begin.size() - 1, ALL);  // by groups: lanes
   for (std::size_t slot = 0; slot < owns.size(); ++slot) {
-    if (owns[slot] == 0) none[slot / simd::GROUP] |= static_cast<std::uint16_t>(1u << slot % simd::GROUP);
+    if (owns[slot] != 0) none[slot / simd::GROUP] &= static_cast<std::uint16_t>(~(1u << slot % simd::GROUP));
   }
   for (std::size_t g = 0; g < none.size(); ++g) {
     for (std::uint32_t k = begin[g]; k < begin[g + 1]; ++k) {
       for (std::size_t lane = 0; lane < simd::GROUP; ++lane) {
-        if (none[g] >> lane & 1) pairs[k].rows[lane] |= none[others[k]];
+        const bool is_none = none[g] >> lane & 1;
+        if (others[k] == g) {
+          const std::uint32_t up_to_it = (2u << lane) - 1;
+          pairs[k].rows[lane] |= is_none ? ALL : static_cast<std::uint16_t>(up_to_it & ~none[g]);
+          continue;
+        }
+        if (is_none) pairs[k].rows[lane] |= none[others[k]];
         if (none[others[k]] >> lane & 1) pairs[k].columns[lane] |= none[g];
       }
     }

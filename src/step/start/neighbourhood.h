@@ -21,7 +21,8 @@ struct FacesSharing {
   std::vector<std::uint32_t> begin, others;
   std::vector<simd::LanePairs> pairs;
   void build(const ClusterTree& faces, const SlotsAtVertex& at, Index first_vertex);
-  /// Adds to these, of the same groups, all pairs of faces of which neither stands for an edge. owns: Neighbourhood's.
+  /// Adds to these, of the same groups, all pairs of faces of which neither stands for an edge, and within a group one
+  /// order of each other pair: what is left has a face in its row that does. owns: Neighbourhood's.
   void leaveOut(const std::vector<std::uint8_t>& owns);
   simd::KnownPairs view() const { return {begin.data(), others.data(), pairs.data()}; }
 };
