@@ -80,6 +80,12 @@ class Clouds : public ::testing::Test {
   }
 };
 
+void showCamera(Driven& scene) {
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(cameraPose(1));
+  scene.feed_tf.add(message, true);
+}
+
 TEST_F(Clouds, ATableIsMetWhereTheCameraSawIt) {
   driven.feed(1, 0.35f);
   EXPECT_EQ(driven.feed(1.1, 0.34f).status, StepStatus::NO_MAP) << "clouds are called for";
@@ -152,9 +158,7 @@ TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
   Driven report(tree);
   CloudMapping mapping(report.config, report.feed_tf, memory);
   mapping.setFrame("world");
-  tf2_msgs::TFMessage message;
-  message.transforms.push_back(cameraPose(1));
-  report.feed_tf.add(message, true);
+  showCamera(report);
   const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
   ASSERT_TRUE(map.known) << map.problem;
   EXPECT_TRUE(map.known->isKnown(Box{{0.05, 0.05, 0.05}, {0.2, 0.2, 0.3}}));
@@ -169,9 +173,7 @@ TEST_F(Clouds, AnOctreeThatIsTooLargeIsRefusedWithWhatToDo) {
   const MapMemory little(small.config);
   CloudMapping mapping(small.config, small.feed_tf, little);
   mapping.setFrame("world");
-  tf2_msgs::TFMessage message;
-  message.transforms.push_back(cameraPose(1));
-  small.feed_tf.add(message, true);
+  showCamera(small);
   const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
   EXPECT_EQ(map.surface, nullptr);
   EXPECT_NE(map.problem.find("a quarter of max_map_mb 1 is for it: raise that or obstacle_resolution_m"),
@@ -189,9 +191,7 @@ TEST_F(Clouds, OneWhoseMapIsRefusedForMemoryLeavesInDoubtWhatTheNextOneShows) {
     const MapMemory own_memory(owner.config);
     CloudMapping mapping(owner.config, owner.feed_tf, own_memory);
     mapping.setFrame("world");
-    tf2_msgs::TFMessage message;
-    message.transforms.push_back(cameraPose(1));
-    owner.feed_tf.add(message, true);
+    showCamera(owner);
     const auto see = [&](const sensor_msgs::PointCloud2& cloud) {
       LoadedMap map = mapping.add(bytesOf(cloud), 0, [] { return false; });
       const bool is_map = map.surface != nullptr;
