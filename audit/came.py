@@ -1,0 +1,442 @@
+"""What came: the messages of a bag, mesh files and octomaps, read by readers of their own.
+
+A reader either has all of an input, counts what it passed over (`unchecked`), or raises: NotCovered where this audit does
+not know the form, Refused where the pages (doc/messages.md, doc/mesh_files.md) say that the monitor must refuse it.
+"""
+import os
+import re
+import struct
+import subprocess
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+class NotCovered(Exception):
+    """This audit cannot judge it."""
+
+
+class Refused(Exception):
+    """By the pages this is no input."""
+
+
+@dataclass
+class Surface:
+    """Which vertices make edges and faces."""
+    vertices: int
+    faces: np.ndarray = field(default_factory=lambda: np.empty((0, 3), int))
+    lines: np.ndarray = field(default_factory=lambda: np.empty((0, 2), int))
+
+    def __post_init__(self):
+        sides = [np.sort(self.faces[:, [i, (i + 1) % 3]], axis=1) for i in range(3)] + [np.sort(self.lines, axis=1)]
+        every = np.concatenate(sides) if len(self.faces) or len(self.lines) else np.empty((0, 2), int)
+        self.edges, counts = np.unique(every, axis=0, return_counts=True) if len(every) else (every, np.empty(0))
+        self.used = np.unique(self.edges)
+        self.closed = len(self.faces) > 0 and len(self.lines) == 0 and bool((counts % 2 == 0).all())
+        self.pieces = np.arange(self.vertices)  # vertices that edges join have one number
+        while len(self.edges):
+            least = self.pieces[self.edges].min(1)
+            joined = self.pieces.copy()
+            np.minimum.at(joined, self.edges.ravel(), np.repeat(least, 2))
+            joined = joined[joined]
+            if (joined == self.pieces).all():
+                break
+            self.pieces = joined
+
+    def same_as(self, other):
+        return (self.vertices == other.vertices and np.array_equal(self.edges, other.edges)
+                and np.array_equal(np.unique(np.sort(self.faces, 1), axis=0), np.unique(np.sort(other.faces, 1), axis=0)))
+
+
+@dataclass
+class Frame:
+    """One body at one time, in the coordinates of its message."""
+    stamp: int       # [ns]
+    frame: str
+    positions: np.ndarray
+    surface: Surface = None
+    unchecked: int = 0
+    came: int = 0    # [ns] when the bag has it
+    number: int = 0  # place among all messages
+
+
+def grid(rows, cols):
+    """Row by row; the two faces of a cell meet in the edge from (row, col + 1) to (row + 1, col)."""
+    a = (np.arange(rows - 1)[:, None] * cols + np.arange(cols - 1)).ravel()
+    faces = np.stack([np.stack([a, a + cols, a + 1], 1), np.stack([a + 1, a + cols, a + cols + 1], 1)], 1)
+    return Surface(rows * cols, faces.reshape(-1, 3))
+
+
+def rope(points, begin=0):
+    i = np.arange(begin, begin + points - 1)
+    return np.stack([i, i + 1], 1)
+
+
+def fans(polygons, positions):
+    """Triangles of polygons, and how many could not be used. A polygon of more corners must be convex to be judged here."""
+    faces, lost = [], 0
+    for corners in polygons:
+        corners = [c for i, c in enumerate(corners) if c != corners[i - 1]]
+        if len(set(corners)) != len(corners) or len(corners) < 3:
+            lost += 1
+            continue
+        if len(corners) > 3:
+            p = positions[corners]
+            turns = np.cross(np.roll(p, -1, 0) - p, np.roll(p, -2, 0) - np.roll(p, -1, 0))
+            if not ((turns @ turns.sum(0)) > 0).all():
+                raise NotCovered('a polygon of %d corners that is not convex' % len(corners))
+        faces += [[corners[0], corners[i], corners[i + 1]] for i in range(1, len(corners) - 1)]
+    return np.array(faces, int).reshape(-1, 3), lost
+
+
+def welded(corners):
+    """Corners of equal coordinates are one vertex, numbered by their first."""
+    known, index, kept = {}, [], []
+    for c in (corners + 0.0).tolist():  # -0.0 is 0.0
+        number = known.setdefault(tuple(c), len(known))
+        if number == len(kept):
+            kept.append(c)
+        index.append(number)
+    return np.array(kept).reshape(-1, 3), np.array(index, int)
+
+
+# -- messages -----------------------------------------------------------------------------------------------------------
+
+
+def cloud_points(message):
+    fields = {f.name: f for f in message.fields}
+    n, order = message.height * message.width, '>' if message.is_bigendian else '<'
+    row = message.row_step if message.height > 1 else message.width * message.point_step
+    if message.height > 1 and len(message.data) == n * message.point_step:
+        row = message.width * message.point_step
+    columns = []
+    for name in 'xyz':
+        if name not in fields or fields[name].datatype not in (7, 8):
+            raise Refused('no field %s of floats' % name)
+        kind = np.dtype(order + ('f4' if fields[name].datatype == 7 else 'f8'))
+        if len(message.data) < (message.height - 1) * row + (message.width - 1) * message.point_step + \
+                fields[name].offset + kind.itemsize:
+            raise Refused('fewer data than points')
+        columns.append(np.ndarray((message.height, message.width), kind, message.data, fields[name].offset,
+                                  (row, message.point_step)).astype(float).ravel())
+    return np.stack(columns, 1)
+
+
+def turned(q, points):
+    """The points, turned by the quaternion x, y, z, w."""
+    x, y, z, w = np.asarray(q, float) / np.linalg.norm(q)
+    m = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                  [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                  [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return points @ m.T
+
+
+class Reader:
+    """Of the messages of one body: what its parameters, and the frames before, say of the topology."""
+
+    def __init__(self, settings, files):
+        self.settings, self.files = settings, files
+        self.weld = self.known = None
+
+    def read(self, message, kind, came, number):
+        header = getattr(message, 'header', None)
+        if kind == 'visualization_msgs/MarkerArray':
+            header = message.markers[0].header if message.markers else None
+        if kind == 'pcl_msgs/PolygonMesh' and not message.header.frame_id:
+            header = message.cloud.header
+        stamp = header.stamp.to_nsec() if header and header.stamp.to_nsec() else came
+        name = (header.frame_id if header and header.frame_id else self.settings.get('frame_id', '')).lstrip('/')
+        positions, surface, unchecked = getattr(self, kind.split('/')[1])(message)
+        surface = self.given(positions) or surface
+        if surface is None:
+            raise Refused('nothing says which vertices make the faces')
+        if surface.vertices != len(positions):
+            raise Refused('%d points, and a topology of %d' % (len(positions), surface.vertices))
+        if self.known is not None and surface is not self.known and surface.same_as(self.known):
+            surface = self.known
+        self.known = surface
+        lost = ~np.isfinite(positions).all(1)
+        bare = np.ones(len(positions), bool)
+        bare[surface.used] = False
+        return Frame(stamp, name, positions, surface, unchecked + int((lost | bare).sum()), came, number)
+
+    def given(self, positions):
+        topology = self.settings.get('topology', {})
+        if isinstance(topology, str):
+            topology = {'source': topology}
+        if topology.get('source') == 'depth_image':
+            raise NotCovered('a depth image as a body')
+        if 'file' in topology:
+            mesh = self.files.mesh(topology['file'])
+            return mesh[1]
+        if topology.get('rows') and topology.get('cols'):
+            return self.reuse(('grid', topology['rows'], topology['cols']), lambda: grid(topology['rows'], topology['cols']))
+        if topology.get('source') == 'polyline' and self.lines is None:
+            return self.reuse(('rope', len(positions)), lambda: Surface(len(positions), lines=rope(len(positions))))
+        return None
+
+    lines = None
+    made = (None, None)
+
+    def reuse(self, key, make):
+        if self.made[0] != key:
+            self.made = (key, make())
+        return self.made[1]
+
+    def PointCloud2(self, m):
+        points = cloud_points(m)
+        if not len(points):
+            raise Refused('no points')
+        surface = self.reuse(('grid', m.height, m.width), lambda: grid(m.height, m.width)) \
+            if m.height > 1 and m.width > 1 else None
+        return points, surface, 0
+
+    def MeshStamped(self, m):
+        points = np.array([(p.x, p.y, p.z) for p in m.vertices], float).reshape(-1, 3)
+        return (points,) + self.indexed([t.vertex_indices for t in m.triangles], points)
+
+    def Mesh(self, m):
+        points = np.array([(p.x, p.y, p.z) for p in m.vertices], float).reshape(-1, 3)
+        return (points,) + self.indexed([t.vertex_indices for t in m.triangles], points)
+
+    def PolygonMesh(self, m):
+        points = cloud_points(m.cloud)
+        return (points,) + self.indexed([p.vertices for p in m.polygons], points)
+
+    def indexed(self, polygons, points):
+        if not polygons:
+            return self.known, 0
+        if max(max(p) for p in polygons if p) >= len(points):
+            raise Refused('an index that is no vertex')
+        key = tuple(tuple(p) for p in polygons)
+        if self.made[0] != key:
+            faces, lost = fans(polygons, points)
+            self.made = (key, Surface(len(points), faces), lost)
+        return self.made[1], self.made[2]
+
+    def Marker(self, m):
+        class One:
+            markers = [m]
+        return self.MarkerArray(One)
+
+    def MarkerArray(self, m):
+        marker = self.settings.get('marker', {})
+        mine = [x for x in m.markers if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
+                and marker.get('namespace', x.ns) == x.ns and marker.get('id', x.id) == x.id]
+        soup = [x for x in mine if x.type == 11]
+        if not soup:
+            return self.ropes(mine)
+        if len({(x.ns, x.id) for x in soup}) > 1:
+            raise NotCovered('several lists of triangles in a message')
+        corners = self.placed(soup[0], True)
+        if len(corners) % 3:
+            raise Refused('no whole number of triangles')
+        if self.settings.get('weld', 'on') in ('off', False):
+            index = np.arange(len(corners))
+        else:
+            if self.weld is None or len(self.weld) != len(corners):
+                self.weld = welded(corners)[1]
+            first = np.unique(self.weld, return_index=True)[1]
+            if not (corners[first][self.weld] == corners).all():
+                raise NotCovered('welded corners that come apart')
+            index, corners = self.weld, corners[first]
+        faces, lost = fans(index.reshape(-1, 3).tolist(), corners)
+        return corners, self.reuse(('soup', faces.tobytes()), lambda: Surface(len(corners), faces)), lost
+
+    def ropes(self, markers):
+        strips = [x for x in markers if x.type == 4 and len(x.points) > 1]
+        points = [x for x in markers if x.type in (7, 8)]
+        if len(strips) == 1 and not any(x.type == 5 for x in markers):
+            at = self.placed(strips[0], False)
+            if (at[0] == at[-1]).all():
+                raise NotCovered('a rope that ends where it begins')
+            return at, self.reuse(('rope', len(at)), lambda: Surface(len(at), lines=rope(len(at)))), 0
+        if len(points) == 1 and len(markers) == 1:
+            return self.placed(points[0], False), None, 0
+        raise NotCovered('these markers: types %s' % sorted({x.type for x in markers}))
+
+    def placed(self, m, scaled):
+        points = np.array([(p.x, p.y, p.z) for p in m.points], float).reshape(-1, 3)
+        scale = (m.scale.x, m.scale.y, m.scale.z)
+        if scaled and any(scale) and scale != (1, 1, 1):
+            points = points * scale
+        q, t = m.pose.orientation, m.pose.position
+        quaternion = (q.x, q.y, q.z, q.w)
+        if any(quaternion) and quaternion != (0, 0, 0, 1):
+            points = turned(quaternion, points)
+        return points + (t.x, t.y, t.z) if (t.x, t.y, t.z) != (0, 0, 0) else points
+
+    def PoseArray(self, m):
+        points = np.array([(p.position.x, p.position.y, p.position.z) for p in m.poses], float).reshape(-1, 3)
+        if len(points) < 2:
+            raise Refused('fewer than two poses')
+        return points, self.reuse(('rope', len(points)), lambda: Surface(len(points), lines=rope(len(points)))), 0
+
+
+# -- files --------------------------------------------------------------------------------------------------------------
+
+
+class Files:
+    """Mesh files, by path or package://, each read once: positions, surface, how many polygons could not be used."""
+
+    def __init__(self, folder='.'):
+        self.folder, self.meshes = folder, {}
+
+    def path(self, name):
+        if name.startswith('package://'):
+            package, rest = name[10:].split('/', 1)
+            found = subprocess.run(['rospack', 'find', package], capture_output=True, text=True).stdout.strip()
+            return os.path.join(found, rest)
+        return os.path.join(self.folder, name[7:] if name.startswith('file://') else name)
+
+    def mesh(self, name):
+        if name not in self.meshes:
+            path = self.path(name)
+            reader = {'.obj': read_obj, '.ply': read_ply, '.stl': read_stl}.get(os.path.splitext(path)[1].lower())
+            if reader is None:
+                raise NotCovered('mesh files as %s' % name)
+            positions, polygons, lines = reader(path)
+            faces, lost = fans(polygons, positions)
+            self.meshes[name] = positions, Surface(len(positions), faces, np.array(lines, int).reshape(-1, 2)), lost
+        return self.meshes[name]
+
+
+def read_obj(path):
+    vertices, polygons, lines = [], [], []
+    for line in open(path).read().replace('\\\n', ' ').splitlines():
+        word = line.split('#')[0].split()
+        if word and word[0] == 'v':
+            vertices.append([float(w) for w in word[1:4]])
+        elif word and word[0] in 'fl':
+            corner = [int(w.split('/')[0]) for w in word[1:]]
+            corner = [c - 1 if c > 0 else len(vertices) + c for c in corner]
+            if word[0] == 'f':
+                polygons.append(corner)
+            else:
+                lines += zip(corner, corner[1:])
+    return np.array(vertices).reshape(-1, 3), polygons, lines
+
+
+def read_stl(path):
+    data = open(path, 'rb').read()
+    count = struct.unpack_from('<I', data, 80)[0] if len(data) >= 84 else 0
+    if len(data) >= 84 and len(data) >= 84 + 50 * count and not (data[:5] == b'solid' and b'facet' in data[:1000]):
+        records = np.frombuffer(data, np.dtype([('n', '<f4', 3), ('v', '<f4', (3, 3)), ('a', '<u2')]), count, 84)
+        corners = records['v'].astype(float).reshape(-1, 3)
+    else:
+        words = re.findall(rb'(?i)vertex\s+(\S+)\s+(\S+)\s+(\S+)', data)
+        corners = np.array([[float(w) for w in v] for v in words]).reshape(-1, 3)
+    positions, index = welded(corners)
+    return positions, index.reshape(-1, 3).tolist(), []
+
+
+PLY_TYPES = {'char': 'i1', 'uchar': 'u1', 'short': 'i2', 'ushort': 'u2', 'int': 'i4', 'uint': 'u4', 'float': 'f4', 'double': 'f8',
+             'int8': 'i1', 'uint8': 'u1', 'int16': 'i2', 'uint16': 'u2', 'int32': 'i4', 'uint32': 'u4', 'float32': 'f4', 'float64': 'f8'}
+
+
+def read_ply(path):
+    data = open(path, 'rb').read()
+    end = data.index(b'end_header')
+    body = data.index(b'\n', end) + 1
+    elements, form = [], None
+    for line in data[:end].decode('latin-1').splitlines():
+        word = line.split()
+        if word[:1] == ['format']:
+            form = word[1]
+        elif word[:1] == ['element']:
+            elements.append((word[1], int(word[2]), []))
+        elif word[:1] == ['property']:
+            elements[-1][2].append(word[1:])
+    at, text, order = body, iter(data[body:].split()), '>' if form == 'binary_big_endian' else '<'
+
+    def value(kind):
+        nonlocal at
+        if form == 'ascii':
+            word = next(text)
+            return float(np.float32(word)) if PLY_TYPES[kind] == 'f4' else float(word)
+        kind = np.dtype(order + PLY_TYPES[kind])
+        at += kind.itemsize
+        return np.frombuffer(data, kind, 1, at - kind.itemsize)[0].item()
+
+    read = {}
+    for name, count, properties in elements:
+        rows = []
+        for _ in range(count):
+            row = {}
+            for p in properties:
+                row[p[-1]] = [value(p[2]) for _ in range(int(value(p[1])))] if p[0] == 'list' else value(p[0])
+            rows.append(row)
+        read[name] = rows
+    vertices = np.array([[r['x'], r['y'], r['z']] for r in read.get('vertex', [])]).reshape(-1, 3)
+    polygons = [[int(i) for i in r.get('vertex_indices', r.get('vertex_index', []))] for r in read.get('face', [])]
+    lines = [(int(r['vertex1']), int(r['vertex2'])) for r in read.get('edge', [])] if not polygons else []
+    if set(read) - {'vertex', 'face', 'edge'}:
+        raise NotCovered('a PLY with the elements %s' % sorted(read))
+    return vertices, polygons, lines
+
+
+# -- octomaps -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Map:
+    """Occupied leaves as cubes: the smallest key and the edge, in voxels. Key k begins at (k - 32768) resolution."""
+    resolution: float
+    corners: np.ndarray  # n x 3
+    sizes: np.ndarray
+    stamp: int = 0
+    frame: str = ''
+    came: int = 0
+    number: int = 0
+
+    def boxes(self):
+        keys = self.corners.astype(float) - 32768
+        return keys * self.resolution, (keys + self.sizes[:, None]) * self.resolution
+
+
+def leaves_of(data, binary, bytes_a_node=4):
+    corners, sizes, at = [], [], 0
+    if not len(data):
+        return np.empty((0, 3), int), np.empty(0, int)
+    stack = [(0, 0, 0, 65536)]
+    while stack:
+        x, y, z, size = stack.pop()
+        half = size // 2
+        child = lambda i: (x + half * (i & 1), y + half * (i >> 1 & 1), z + half * (i >> 2 & 1), half)
+        if binary:
+            bits = data[at] | data[at + 1] << 8
+            at += 2
+            kinds = [bits >> (2 * i) & 3 for i in range(8)]
+            for i in range(8):
+                if kinds[i] == 2:
+                    corners.append(child(i)[:3])
+                    sizes.append(half)
+            stack += [child(i) for i in reversed(range(8)) if kinds[i] == 3]
+        else:
+            value, bits = struct.unpack_from('<f', data, at)[0], data[at + bytes_a_node]
+            at += bytes_a_node + 1
+            if bits == 0 and value >= 0:
+                corners.append((x, y, z))
+                sizes.append(size)
+            stack += [child(i) for i in reversed(range(8)) if bits >> i & 1]
+    return np.array(corners, int).reshape(-1, 3), np.array(sizes, int)
+
+
+def octomap(data, binary, kind, resolution):
+    data = bytes(b & 255 for b in data) if not isinstance(data, bytes) else data
+    if data[:1] == b'#':
+        head, data = data.split(b'\ndata\n', 1)
+        words = dict(line.split(None, 1) for line in head.decode('latin-1').splitlines() if not line.startswith('#'))
+        kind, resolution, binary = words.get('id', kind).strip(), float(words['res']), b'binary' in head.split(b'\n')[0]
+    nodes = {'OcTree': 4, 'ColorOcTree': 7}
+    if not binary and kind not in nodes:
+        raise NotCovered('a full octomap of type %s' % kind)
+    corners, sizes = leaves_of(data, binary, nodes.get(kind, 4))
+    return Map(resolution, corners, sizes)
+
+
+def octomap_message(message, came, number):
+    found = octomap(message.data, message.binary, message.id, message.resolution)
+    found.stamp = message.header.stamp.to_nsec() or came
+    found.frame, found.came, found.number = message.header.frame_id.lstrip('/'), came, number
+    return found
