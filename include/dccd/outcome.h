@@ -101,8 +101,6 @@ struct StepStats {
   std::uint64_t undecided = 0, initial = 0, leaving = 0;
   std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
-  std::uint64_t unfolded_parts = 0;   ///< parts of surfaces that certainly do not fold within themselves
-  std::uint64_t unfolded_pairs = 0;   ///< pairs of clusters, or of groups of them, not looked at for that
   std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
   std::uint64_t bodies_far = 0;        ///< near nothing that they are tested against; no bounds are computed
@@ -128,8 +126,6 @@ struct StepStats {
   COUNTER(unchecked_vertices, true) \
   COUNTER(unchecked_faces, true)    \
   COUNTER(unfolded_bodies, false)   \
-  COUNTER(unfolded_parts, false)    \
-  COUNTER(unfolded_pairs, false)    \
   COUNTER(bodies_refitted, false)   \
   COUNTER(bodies_kept, false)       \
   COUNTER(body_pairs, false)        \

@@ -227,7 +227,7 @@ bool History::Impl::fill(const Part& part, StepStats& stats) {
   // A single body that does not meet itself is tested against the map alone, which has bounds of its own.
   const bool any = std::find(bounded_.begin(), bounded_.end(), 1) != bounded_.end();
   std::vector<std::uint8_t> leaves_wait;
-  for (const Unfolded& surface : self_tests.unfolded()) leaves_wait.push_back(surface.holdsMost());
+  for (const Unfolded& surface : self_tests.unfolded()) leaves_wait.push_back(surface.isCertified());
   if (any || bounded_.size() > 1) scene.refit(inPieces, stats, bounded_, leaves_wait);
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;

@@ -123,7 +123,6 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   }
   end();
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
-  stats_.unfolded_pairs += stream_.clusterPairsLeftOut();
   stream_.clearCounters();
 }
 

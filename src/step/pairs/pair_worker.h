@@ -62,7 +62,6 @@ struct StepContext {
   double tolerance_m = 0;                           ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};            ///< earliest_only: contacts after this are not wanted
   FoundLimit* found = nullptr;                      ///< null: no limit
-  const std::vector<Unfolded>* unfolded = nullptr;  ///< per body; null: nothing is known of them
   double not_after = 2;                             ///< earliest_only: contacts that begin after this are not listed
   bool bounds_late = false;  ///< earliest_only: a pair's TOC is bounded before its elementary test
   Span span;                 ///< of the bounds
@@ -71,13 +70,8 @@ struct StepContext {
   std::atomic<std::size_t> hits{0};
   /// Of the pairs of two bodies, or of a body with itself.
   TreePair treesOf(PairKind kind, std::size_t a, std::size_t b) const {
-    TreePair trees{&scene->bodies()[a].tree(firstKind(kind)), &scene->bodies()[b].tree(secondKind(kind)),
-                   a == b && kind == PairKind::EDGE_EDGE, span, a == b};
-    if (a == b && unfolded) {
-      trees.parts_a = (*unfolded)[a].parts(firstKind(kind));
-      trees.parts_b = (*unfolded)[a].parts(secondKind(kind));
-    }
-    return trees;
+    return {&scene->bodies()[a].tree(firstKind(kind)), &scene->bodies()[b].tree(secondKind(kind)),
+            a == b && kind == PairKind::EDGE_EDGE, span, a == b};
   }
   Deadline pairsDeadline() const {
     return deadline.movedBy(-per_hit * static_cast<std::int64_t>(hits.load(std::memory_order_relaxed)));

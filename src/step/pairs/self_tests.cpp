@@ -42,25 +42,20 @@ void SelfTests::choose(const Part& part, const std::vector<std::uint8_t>& apart,
       continue;
     }
     const Deadline::Clock::time_point start = Deadline::Clock::now();
-    const bool whole = certify(part, b, stats);
+    const bool unfolded = certify(part, b);
+    stats.unfolded_bodies += unfolded;
     stats[Effect::SELF_COLLISION].ms += msSince(start);
-    tested_[b] = !whole;
-    if (whole && part.observer) {
+    tested_[b] = !unfolded;
+    if (unfolded && part.observer) {
       part.observer->onSelfLeftOut(b, "the whole surface certainly does not fold onto itself in this step");
     }
   }
 }
 
-/// True: all of it is certified.
-bool SelfTests::certify(const Part& part, std::size_t b, StepStats& stats) {
+bool SelfTests::certify(const Part& part, std::size_t b) {
   if (!mayBeUnfolded(part, b)) return false;
-  Unfolded& unfolded = unfolded_[b];
-  unfolded.run(part.scene.bodies()[b], part.scene.vertices(), std::cref(part.prepared.threads));
-  const bool whole = unfolded.isWhole();
-  if (part.observer && !whole) unfolded.clear();  // it wants to see the pairs
-  stats.unfolded_bodies += whole;
-  stats.unfolded_parts += whole ? 0 : unfolded.partCount();
-  return whole;
+  unfolded_[b].run(part.scene.bodies()[b], part.scene.vertices(), std::cref(part.prepared.threads));
+  return unfolded_[b].isCertified();
 }
 
 }  // namespace dccd

@@ -17,12 +17,12 @@ class SelfTests {
   /// apart: Carried::apart.
   void choose(const Part& part, const std::vector<std::uint8_t>& apart, StepStats& stats);
 
-  /// Per body: its pairs with itself are looked at, but for those in its unfolded parts.
+  /// Per body: its pairs with itself are looked at.
   const std::vector<std::uint8_t>& tested() const { return tested_; }
   const std::vector<Unfolded>& unfolded() const { return unfolded_; }
 
  private:
-  bool certify(const Part& part, std::size_t body, StepStats& stats);
+  bool certify(const Part& part, std::size_t body);
 
   std::vector<std::uint8_t> tested_;
   std::vector<Unfolded> unfolded_;  // per body

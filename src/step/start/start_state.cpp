@@ -49,8 +49,7 @@ struct FeaturesOfBody {
 };
 
 /// Of faces, or of the edges of a and the faces of b.
-TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, bool by_faces,
-                 const std::vector<Unfolded>* unfolded) {
+TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, bool by_faces) {
   const FeatureKind first = by_faces ? FeatureKind::FACE : FeatureKind::EDGE;
   TreePair trees;
   trees.a = &scene.bodies()[a].tree(first);
@@ -58,10 +57,6 @@ TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, boo
   trees.span.times = Times::T0;
   trees.adjacent = a == b;
   trees.self = by_faces && a == b;
-  if (a == b && unfolded) {  // what does not meet during the step does not at t=0
-    trees.parts_a = (*unfolded)[a].parts(first);
-    trees.parts_b = (*unfolded)[a].parts(FeatureKind::FACE);
-  }
   return trees;
 }
 
@@ -334,10 +329,11 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
                                     const Parallel& parallel) {
   const std::uint32_t a = next_bodies_[0], b = next_bodies_[1];
   const bool by_faces = by_faces_[a] && by_faces_[b];
-  TreePair trees = treesOf(scene, a, b, by_faces, unfolded_);
+  TreePair trees = treesOf(scene, a, b, by_faces);
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
   if (beforeListing(deadline).isOver()) return false;
-  if (a == b && unfolded_ && (*unfolded_)[a].isWhole()) return true;
+  // What does not meet during the step does not at t=0.
+  if (a == b && unfolded_ && (*unfolded_)[a].isCertified()) return true;
   learnNeighbourhoods(scene);
   for (const std::uint32_t body : next_bodies_) {
     if (by_faces) neighbourhoods_[body].learnFaces(scene.bodies()[body]);

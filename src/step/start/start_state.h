@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "culling/scene_arrays.h"
+#include "culling/unfolded.h"
 #include "dccd/deadline.h"
 #include "step/pairs/found_limit.h"
 #include "step/start/crossing_finder.h"
