@@ -36,7 +36,7 @@ void keepShare(bool sample, std::vector<std::uint32_t>& pairs) {
 bool stopsAtFirst(const Part& part) {
   const Options& options = part.options();
   return options.earliest_only && options.accuracy.rung == Accuracy::EXACT &&
-         options.broad_phase == BroadPhase::CLUSTERED && !part.observer;
+         options.broad_phase == BroadPhase::CLUSTERED;
 }
 
 }  // namespace
@@ -57,7 +57,6 @@ void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays&
   context.earliest_only = options.earliest_only;
   context.bounds_late = options.earliest_only && !until_first;
   context.left_out = &part.prepared.left_out.of_body;
-  context.observer = part.observer;
   context.deadline = part.deadline;
   context.per_hit = part.per_hit;
   if (holdsDistance(options.accuracy.rung)) context.tolerance_m = options.accuracy.tolerance_m;

@@ -9,7 +9,6 @@
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
-#include "step/observer.h"
 #include "step/pairs/found_limit.h"
 #include "step/pairs/left_out.h"
 #include "step/pairs/pair_separation.h"
@@ -57,7 +56,6 @@ struct StepContext {
   Deadline deadline;
   std::atomic<bool> expired{false};
   bool earliest_only = false;
-  StepObserver* observer = nullptr;
   const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
   double tolerance_m = 0;                           ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};            ///< earliest_only: contacts after this are not wanted

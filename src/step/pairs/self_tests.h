@@ -9,7 +9,11 @@
 
 namespace dccd {
 
+struct Options;
 struct Part;
+
+/// The certificate has something to say of the body and itself in this step.
+bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t body);
 
 class SelfTests {
  public:
