@@ -11,7 +11,7 @@
 #include <ros/time.h>
 #include <rosbag/bag.h>
 
-#include "dccd/look_ahead_score.h"
+#include "report/look_ahead_score.h"
 #include "node/map_loader.h"
 #include "node/monitor_pipeline.h"
 

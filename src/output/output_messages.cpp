@@ -292,9 +292,6 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   }
   out.excluded_voxels = outcome.excluded_voxels;
   out.unknown_fraction = outcome.unknown_fraction;
-  out.look_ahead_compared = static_cast<std::uint32_t>(context.look_ahead.compared);
-  out.look_ahead_median_error = context.look_ahead.median_error_s;
-  out.look_ahead_p95_error = context.look_ahead.p95_error_s;
   out.maps_received = context.maps_received;
   out.maps_refused = context.maps_refused;
   out.markers_built = context.markers_built;

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dccd/effect_plan.h"
-#include "dccd/look_ahead_score.h"
+#include "report/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "report/clearance_table.h"
 #include "report/lanes.h"

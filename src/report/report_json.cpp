@@ -116,12 +116,9 @@ nlohmann::json Report::effectsJson() const {
 nlohmann::json Report::lookAheadJson() const {
   if (!look_ahead_) return {};
   return {{"horizon_s", horizon_s_},
-          {"compared", look_ahead_->compared},
+          {"came_true", look_ahead_->came_true},
           {"not_observed", look_ahead_->not_observed},
-          {"not_predicted", look_ahead_->not_predicted},
-          {"median_error_s", look_ahead_->median_error_s},
-          {"p95_error_s", look_ahead_->p95_error_s},
-          {"median_signed_error_s", look_ahead_->median_signed_error_s}};
+          {"not_predicted", look_ahead_->not_predicted}};
 }
 
 nlohmann::json Report::json() const {

@@ -64,7 +64,6 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
     bool done = false;
     ~Guard() {
       if (!done) history.forgetPrepared();
-      history.begins_at = nullptr;
     }
   } guard{*this};
   const Clock::time_point called = Clock::now();
@@ -166,8 +165,8 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
   const Options& options = *prepared.options;
   std::size_t found_limit = foundLimit(options, scene.bodies());
   if (found_limit != FoundLimit::NONE) found_limit -= std::min(found_limit, outcome.contacts.size());
-  const Part part{step,     index, count,       continues, deadline,  Clock::now(),
-                  prepared, scene, found_limit, per_hit_,  begins_at};
+  const Part part{step,         index,    count, continues,   deadline,
+                  Clock::now(), prepared, scene, found_limit, per_hit_};
   Findings result;
   pairs.begin();
   if (!fill(part, result.stats)) {

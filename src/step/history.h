@@ -66,11 +66,9 @@ struct DCCD_HIDDEN Part {
   const SceneArrays& scene;          ///< once it is filled: the part's positions
   std::size_t found_limit;           ///< what may be found in it; FoundLimit::NONE: no limit
   std::chrono::nanoseconds per_hit;  ///< what a hit takes after the pairs, until it is in an outcome
-  History::Impl* begins_at;          ///< of a step aside: where it begins
 
   const Options& options() const { return *prepared.options; }
-  /// Of a step aside from all others only the first part is asked about: nothing is carried over from it.
-  bool checksStartState() const { return options().check_start_state && (index == 0 || !begins_at); }
+  bool checksStartState() const { return options().check_start_state; }
   /// For a stage that begins now: later parts need as much time for what was done before it; what is over is shared.
   Deadline shareFrom(Deadline::Clock::time_point now) const {
     if (deadline.isNever()) return deadline;
@@ -86,7 +84,6 @@ struct History::Impl {
 
   Prepared prepared;
   Carried carried;
-  Impl* begins_at = nullptr;  // the next step begins where this one's ended
 
   // The stages of a part: what each keeps from step to step are buffers, and what it has learnt of the meshes.
   SceneArrays scene;  // the bodies are those that were prepared

@@ -59,9 +59,6 @@ NUMBERS = {
     'doc/mesh_files.md': [
         (r'Files over (\d+) MiB', lambda: constant('src/input/mesh_file.cpp', 'MAX_FILE_BYTES') / MB),
     ],
-    'doc/performance.md': [
-        (r'`~stats` \(newest (\d+)\)', lambda: constant('include/dccd/look_ahead_score.h', 'LOOK_AHEAD_SAMPLES')),
-    ],
     'doc/tools.md': [
         (r'at most (\d+) files a run', lambda: constant('src/record/flight_recorder.h', 'MAX_SURPRISES')),
         (r'room for (\d+) MB of frames', lambda: player('BUDGET_BYTES') / 10**6),

@@ -15,8 +15,7 @@
 
 namespace dccd {
 
-ResultBag::ResultBag(const std::string& path, const MonitorConfig& config)
-    : bag_(path), look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES), diagnostics_(MONITOR_NAMESPACE) {}
+ResultBag::ResultBag(const std::string& path) : bag_(path), diagnostics_(MONITOR_NAMESPACE) {}
 
 template <class Message>
 void ResultBag::write(const char* name, const ros::Time& at, const Message& message) {
@@ -65,10 +64,6 @@ bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
 StatsContext ResultBag::contextOf(const Outcome& outcome, const MonitorPipeline& pipeline,
                                   const BagReplaySummary& so_far) {
   StatsContext context = countersOf(pipeline, so_far);
-  if (pipeline.config().monitor.look_ahead_s > 0) {
-    look_ahead_.observe(outcome);
-    context.look_ahead = look_ahead_.summary();
-  }
   if (!pipeline.fixedFrame().empty()) ++markers_built_;  // before a frame was taken there is none to draw in
   context.markers_built = markers_built_;
   return context;
@@ -142,7 +137,6 @@ void ResultBag::addPrediction(const Outcome& prediction, const MonitorPipeline& 
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   const double horizon_s = pipeline.config().monitor.look_ahead_s;
-  look_ahead_.predict(prediction);
   write("predicted_contacts", at, toContactArray(prediction, bodies, frame));
   write("time_to_contact", at, toTimeToContact(prediction, horizon_s, bodies, frame));
   if (!prediction.answered || frame.empty()) return;

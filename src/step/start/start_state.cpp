@@ -166,22 +166,6 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
   });
 }
 
-bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,
-                               std::vector<StartIntersection>& out) {
-  std::vector<EdgeFace> pairs = candidates_, met;
-  pairs.insert(pairs.end(), found_.begin(), found_.end());
-  std::size_t expanded = 0;
-  const bool whole = inBlocks(
-      pairs, met, deadline, [&] { return expanded < touched_.size(); },
-      [&] { addCandidates(scene, touched_[expanded++], pairs); },
-      [&](const EdgeFace* first, std::size_t count) {
-        finders_.local().addMeeting(scene, first, count, 1, met);
-        return true;
-      });
-  list(scene, met, out, oneByOne);
-  return whole;
-}
-
 /// Takes the pairs from the back, a block at a time, and calls test(pairs, count) with it: sorted, many are the same
 /// and those that follow each other lie together. expand() adds pairs as long as hasMore(). False: the deadline before
 /// the listing of what is found, or a test that returned false, ended it.
@@ -213,7 +197,7 @@ void StartStateSearch::testCandidates(const SceneArrays& scene, const Deadline& 
         touched_.pop_back();
       },
       [&](const EdgeFace* first, std::size_t count) {
-        tested_ += finders_.local().addMeeting(scene, first, count, 0, found_);
+        tested_ += finders_.local().addMeeting(scene, first, count, found_);
         return !hasEnough();
       });
 }
