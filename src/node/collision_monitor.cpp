@@ -211,13 +211,6 @@ CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeH
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
 
-void CollisionMonitor::takeProcess() {
-  impl_->owns_process = true;
-  try {
-    impl_->recorder.installCrashHandler();
-  } catch (const std::runtime_error& error) {
-    ROS_WARN_STREAM("a crash will not be recorded: " << error.what());
-  }
-}
+void CollisionMonitor::takeProcess() { impl_->owns_process = true; }
 
 }  // namespace dccd
