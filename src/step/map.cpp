@@ -6,7 +6,6 @@
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/history.h"
-#include "step/observer.h"
 
 namespace dccd {
 namespace {
