@@ -53,7 +53,7 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
 /// What a scene can call for, and a user can set (doc/interface.md). Each pair and each moment counts for one effect
 /// alone. The second name of a row is that of the setting and of the published fields. Those are pairs in and out, but
 /// - rigid_bodies: bodies that turn, and how often one was placed for a part of the step;
-/// - unknown_space: voxels that the step sweeps, and those that the map does not know;
+/// - unknown_space: zeros, for the map's thread makes an obstacle of it;
 /// - minimum_separation: pairs that carry a distance into the elementary test, and no uncertainty;
 /// - tracker_noise: pairs whose vertices bring an uncertainty radius;
 /// - look_ahead: of the last prediction, pairs past the filters, and contacts;
@@ -224,7 +224,6 @@ struct Outcome : Findings {
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
-  double unknown_fraction = 0;         ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
   std::size_t substeps = 0;            ///< parts that the step was cut into
   Touching touching = Touching::NONE;  ///< of this step alone; assuranceOf() knows what lasts
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.

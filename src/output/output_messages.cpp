@@ -291,7 +291,6 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
     out.map_age = mapAge(outcome);
   }
   out.excluded_voxels = outcome.excluded_voxels;
-  out.unknown_fraction = outcome.unknown_fraction;
   out.maps_received = context.maps_received;
   out.maps_refused = context.maps_refused;
   out.markers_built = context.markers_built;

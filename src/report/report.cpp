@@ -193,7 +193,6 @@ void Report::addTimes(const Outcome& o) {
   }
   timing_ << '\n';
   sum_ += o.stats;
-  if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
   total_ms_.push_back(o.stats.total_ms);
 }
 

@@ -91,7 +91,6 @@ class Report {
   std::array<std::vector<double>, static_cast<std::size_t>(Stage::COUNT)> stage_ms_;
   StepStats sum_;
   std::vector<double> total_ms_;
-  std::vector<double> unknown_fraction_;
   std::size_t left_out_ = 0;
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;

@@ -153,7 +153,6 @@ nlohmann::json Report::json() const {
   j["effects"] = effectsJson();
   for (const StepCounter& counter : STEP_COUNTERS) j["step_counters"][counter.name] = sum_.*counter.value;
   j["left_out"] = {{"pairs", left_out_}};
-  j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
   j["study"] = study_;
   j["partners"] = lanes_.json();

@@ -120,7 +120,7 @@ Finding rigidBodies(const EffectScene& scene) {
 }
 
 Finding unknownSpace(const EffectScene& scene) {
-  if (!scene.unknown_space_counts) return impossible("unknown_space is free; set it to occupied or report");
+  if (!scene.unknown_space_counts) return impossible("unknown_space is free; set it to occupied");
   if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
   if (!scene.map_used) return idle("unknown_space is not free, but there is no map that could know it");
   return wanted("unknown_space is not free");
