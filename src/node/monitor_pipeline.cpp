@@ -1,7 +1,6 @@
 #include "node/monitor_pipeline.h"
 
 #include <algorithm>
-#include <limits>
 #include <new>
 #include <utility>
 
