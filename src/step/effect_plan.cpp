@@ -196,8 +196,7 @@ Finding lookAhead(const EffectScene& scene) {
   return wanted("predictions reach " + metres(scene.look_ahead_s) + " s ahead");
 }
 
-Finding patches(const EffectScene& scene) {
-  if (scene.earliest_only) return impossible("earliest_only is true, and patches are made of all contacts");
+Finding patches(const EffectScene&) {
   return wanted("contacts that belong together are told as one");
 }
 
