@@ -1,5 +1,6 @@
 // What the certificates of surfaces that do not fold buy: whole steps with and without them, in processor time of runs
-// in turn, on a cloth that hardly folds, on what folds in one place or everywhere, and on recorded scenes. Contacts are compared before a time is written.
+// in turn, on a cloth that hardly folds, on what folds in one place or everywhere, and on recorded scenes. Contacts are
+// compared before a time is written.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -139,12 +140,11 @@ int main(int argc, char** argv) {
   app.add_option("--repeat", repeat, "runs of each case")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
-    std::vector<Case> cases{
-        wavingCloth(101), wavingCloth(216),
-        made("sheet with a fold over a tenth", Topology::grid(101, 101), test::rolled(101, 2.8, 0.02, 0.1),
-             test::rolled(101, 3, 0.02, 0.1)),
-        made("sheet with a fold over a tenth", Topology::grid(216, 216), test::rolled(216, 2.8, 0.02, 0.1),
-             test::rolled(216, 3, 0.02, 0.1))};
+    std::vector<Case> cases{wavingCloth(101), wavingCloth(216),
+                            made("sheet with a fold over a tenth", Topology::grid(101, 101),
+                                 test::rolled(101, 2.8, 0.02, 0.1), test::rolled(101, 3, 0.02, 0.1)),
+                            made("sheet with a fold over a tenth", Topology::grid(216, 216),
+                                 test::rolled(216, 2.8, 0.02, 0.1), test::rolled(216, 3, 0.02, 0.1))};
     if (!test::dataDir().empty()) {
       const std::string folder = test::dataDir() + "/scenes/cloth-ball/";
       const test::PlyMesh first = test::readPly(folder + "frame_0.ply"), second = test::readPly(folder + "frame_1.ply");

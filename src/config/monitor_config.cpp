@@ -73,8 +73,9 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.detector.max_contacts = reader.integer("max_contacts", monitor.detector.max_contacts, 1, MANY);
   monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
   if (reader.has("earliest_only")) {
-    reader.fail("earliest_only",
-                "is gone: a monitor looks for all contacts; remove it, or ask the library or Python for the first alone");
+    reader.fail(
+        "earliest_only",
+        "is gone: a monitor looks for all contacts; remove it, or ask the library or Python for the first alone");
   }
   for (const ParameterTree& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);

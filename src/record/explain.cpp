@@ -118,7 +118,8 @@ Place placeOf(const SceneArrays& scene, const Feature& feature) {
   for (std::uint32_t slot = 0;; ++slot) {
     const Index* internal = tree.feature(slot);
     const auto isOf = [&](Index v) {
-      return std::binary_search(feature.vertex.begin(), feature.vertex.end(), body.slot_vertex[v - body.internal_begin]);
+      return std::binary_search(feature.vertex.begin(), feature.vertex.end(),
+                                body.slot_vertex[v - body.internal_begin]);
     };
     if (std::all_of(internal, internal + tree.arity(), isOf)) return {slot, internal, body.rank(kind)[slot]};
   }
@@ -257,8 +258,8 @@ class Explanation {
     const double tolerance_m = holdsDistance(options_.accuracy.rung) ? options_.accuracy.tolerance_m : 0;
     const SeparationRule rule(scene, a, b, tolerance_m);
     const std::uint64_t key = std::uint64_t{place[0].rank} << 32 | place[1].rank;
-    const double apart_m = a == b ? impl.prepared.left_out.of_body[a].distance(kind_, key)
-                                  : std::numeric_limits<double>::infinity();
+    const double apart_m =
+        a == b ? impl.prepared.left_out.of_body[a].distance(kind_, key) : std::numeric_limits<double>::infinity();
     const PairSeparation separation = rule.of(kind_, quad, apart_m);
     if (separation.left_out) {
       say("separation", Says::KEPT, "closer than the separation in the reference frame: left out of it");

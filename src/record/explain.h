@@ -28,9 +28,9 @@ struct TraceLine {
 };
 DCCD_EXPORT const char* toString(TraceLine::Says says);
 
-/// Each filter, and the rung, is asked about the pair alone, whatever the one before said: the later ones confirm what was
-/// rejected.
-/// Throws std::invalid_argument when bodies, vertices, features or a map that the question names do not exist.
+/// Each filter, and the rung, is asked about the pair alone, whatever the one before said: the later ones confirm what
+/// was rejected. Throws std::invalid_argument when bodies, vertices, features or a map that the question names do not
+/// exist.
 DCCD_EXPORT std::vector<TraceLine> explain(const Step& step, const Options& options, const PairQuestion& question);
 
 }  // namespace dccd

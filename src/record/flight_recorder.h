@@ -1,5 +1,5 @@
-// The last steps of a monitor, kept so that they can be written when somebody asks, or when an answer contradicts what was
-// promised.
+// The last steps of a monitor, kept so that they can be written when somebody asks, or when an answer contradicts what
+// was promised.
 #pragma once
 
 #include <limits>

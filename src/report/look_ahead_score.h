@@ -11,8 +11,8 @@
 
 namespace dccd {
 
-/// What is compared is whether a vertex first touches another body, its own, or the map, as vertex or through an edge or
-/// face of it: which of many neighbouring features it meets first is chance.
+/// What is compared is whether a vertex first touches another body, its own, or the map, as vertex or through an edge
+/// or face of it: which of many neighbouring features it meets first is chance.
 struct LookAheadSummary {
   std::size_t came_true = 0;      ///< within their horizon (each prediction of each vertex)
   std::size_t not_observed = 0;   ///< predicted, and not in contact when the horizon was over

@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 
 #include "dccd/effect_plan.h"
-#include "report/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "report/clearance_table.h"
 #include "report/lanes.h"
+#include "report/look_ahead_score.h"
 #include "report/player_data.h"
 
 namespace dccd {

@@ -165,8 +165,7 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
   const Options& options = *prepared.options;
   std::size_t found_limit = foundLimit(options, scene.bodies());
   if (found_limit != FoundLimit::NONE) found_limit -= std::min(found_limit, outcome.contacts.size());
-  const Part part{step,         index,    count, continues,   deadline,
-                  Clock::now(), prepared, scene, found_limit, per_hit_};
+  const Part part{step, index, count, continues, deadline, Clock::now(), prepared, scene, found_limit, per_hit_};
   Findings result;
   pairs.begin();
   if (!fill(part, result.stats)) {

@@ -196,9 +196,7 @@ Finding lookAhead(const EffectScene& scene) {
   return wanted("predictions reach " + metres(scene.look_ahead_s) + " s ahead");
 }
 
-Finding patches(const EffectScene&) {
-  return wanted("contacts that belong together are told as one");
-}
+Finding patches(const EffectScene&) { return wanted("contacts that belong together are told as one"); }
 
 Finding ownVoxels(const EffectScene& scene) {
   std::string bodies;

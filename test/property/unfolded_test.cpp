@@ -1,5 +1,5 @@
-// Random surfaces that are certified: none of their pairs is in contact, by brute force and the oracle, on every target.
-// DEFORMABLE_CCD_LONG=1 runs 100,000 steps; DEFORMABLE_CCD_BLOCKS="FIRST COUNT" some of them, in thousands.
+// Random surfaces that are certified: none of their pairs is in contact, by brute force and the oracle, on every
+// target. DEFORMABLE_CCD_LONG=1 runs 100,000 steps; DEFORMABLE_CCD_BLOCKS="FIRST COUNT" some of them, in thousands.
 #include "culling/unfolded.h"
 
 #include <gtest/gtest.h>

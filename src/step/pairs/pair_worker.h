@@ -57,12 +57,12 @@ struct StepContext {
   std::atomic<bool> expired{false};
   bool earliest_only = false;
   const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
-  double tolerance_m = 0;                           ///< the elementary test may call features this far apart a contact
-  std::atomic<double> best_toc_upper{2};            ///< earliest_only: contacts after this are not wanted
-  FoundLimit* found = nullptr;                      ///< null: no limit
-  double not_after = 2;                             ///< earliest_only: contacts that begin after this are not listed
-  bool bounds_late = false;  ///< earliest_only: a pair's TOC is bounded before its elementary test
-  Span span;                 ///< of the bounds
+  double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
+  std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
+  FoundLimit* found = nullptr;            ///< null: no limit
+  double not_after = 2;                   ///< earliest_only: contacts that begin after this are not listed
+  bool bounds_late = false;               ///< earliest_only: a pair's TOC is bounded before its elementary test
+  Span span;                              ///< of the bounds
   /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
   std::chrono::nanoseconds per_hit{0};
   std::atomic<std::size_t> hits{0};

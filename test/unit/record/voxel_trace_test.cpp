@@ -104,9 +104,9 @@ TEST(VoxelTrace, SaysOfEachFeatureAndLeafWhatTheFlowDoes) {
         EXPECT_TRUE(is_kept || !contactOf(of_leaf[i], kind, vertices, leaf))
             << "seed " << seed << ", " << toString(kind) << ' ' << vertices[0] << ", leaf " << leaf.x << ' ' << leaf.y
             << ' ' << leaf.z;
-        EXPECT_EQ(lines[1].says, !contact                                       ? TraceLine::Says::REJECTED
+        EXPECT_EQ(lines[1].says, !contact                                   ? TraceLine::Says::REJECTED
                                  : contact->certainty == Certainty::CERTAIN ? TraceLine::Says::CONTACT
-                                                                                : TraceLine::Says::UNDECIDED);
+                                                                            : TraceLine::Says::UNDECIDED);
         contacts += contact != nullptr;
       }
     }
