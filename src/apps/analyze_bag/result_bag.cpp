@@ -61,8 +61,7 @@ bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
   return true;
 }
 
-StatsContext ResultBag::contextOf(const Outcome& outcome, const MonitorPipeline& pipeline,
-                                  const BagReplaySummary& so_far) {
+StatsContext ResultBag::contextOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far) {
   StatsContext context = countersOf(pipeline, so_far);
   if (!pipeline.fixedFrame().empty()) ++markers_built_;  // before a frame was taken there is none to draw in
   context.markers_built = markers_built_;
@@ -117,7 +116,7 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
                     const ros::Time& at) {
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  const StatsContext context = contextOf(outcome, pipeline, so_far);
+  const StatsContext context = contextOf(pipeline, so_far);
   write("contacts", at, toContactArray(outcome, bodies, frame));
   addPlan(outcome, pipeline, at);
   write("stats", at, toStepStats(outcome, context, frame));

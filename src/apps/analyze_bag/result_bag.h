@@ -24,7 +24,7 @@ class ResultBag {
   template <class Message>
   void write(const char* name, const ros::Time& at, const Message& message);
   bool copyOthersDiagnostics(const rosbag::MessageInstance& m);
-  StatsContext contextOf(const Outcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
+  StatsContext contextOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at);
   void addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
   void addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
