@@ -97,6 +97,21 @@ std::size_t Contour::widestDirection() const {
   return widest;
 }
 
+/// Along some direction, one is above the other at both times.
+bool Contour::areApart(std::size_t a, std::size_t b, double margin) const {
+  const auto isAbove = [margin](const Corner*(&above)[2], const Corner*(&below)[2], std::size_t d) {
+    return std::min(above[0]->projections[d], above[1]->projections[d]) >
+           std::max(below[0]->projections[d], below[1]->projections[d]) + margin;
+  };
+  const Corner *one[2] = {&corners_[a], &corners_[next(a)]}, *other[2] = {&corners_[b], &corners_[next(b)]};
+  for (std::size_t d = 0; d < DIRECTIONS; ++d) {
+    const std::size_t e = d + DIRECTIONS;
+    if (isAbove(one, other, d) && isAbove(one, other, e)) return true;
+    if (isAbove(other, one, d) && isAbove(other, one, e)) return true;
+  }
+  return false;
+}
+
 /// Edges without a common vertex; false also where there are too many to look at.
 bool Contour::staysApart(double margin) {
   const std::size_t along = widestDirection(), across = (along + DIRECTIONS / 2) % DIRECTIONS;
