@@ -13,7 +13,6 @@
 #include <sstream>
 
 #include "oracle/oracle.h"
-#include "support/closed_meshes.h"
 #include "support/detector.h"
 #include "support/query_property.h"
 #include "support/simd_targets.h"
@@ -82,16 +81,12 @@ Positions closedBand(std::size_t side, int numbers) {
   return x;
 }
 
-/// Surfaces of 500 to 1,200 faces: sheets with a roll, tubes, flat ones that close, with holes, wound ones, Moebius
-/// bands, spheres, bands whose ends touch by a number; some with faces that are cut into three.
+/// Surfaces of 500 to 1,200 faces: sheets with a roll, or with a bend that may be one, with holes, wound ones, Moebius
+/// bands, bands whose ends touch by a number; some with faces that are cut into three.
 class RandomSurface {
  public:
   explicit RandomSurface(std::uint32_t seed) : random_(seed), kind_(seed % 9), n_(20 + random_() % 5) {
-    const test::StepBody sphere = test::ball(Vec3(0, 0, 0), 1, 3);
-    Topology topology = kind_ == 1 || kind_ == 2 ? test::tube(n_, n_)
-                        : kind_ == 6             ? moebius(n_)
-                        : kind_ == 7             ? sphere.topology
-                                                 : Topology::grid(n_, n_);
+    Topology topology = kind_ == 6 ? moebius(n_) : Topology::grid(n_, n_);
     if (kind_ == 3) topology = withHoles(topology);
     const double size = std::exp2((seed % 5 == 0 ? 100 : 10) * unit()), wave = kind_ == 8 ? 0 : 0.06 * unit();
     const double noise = kind_ == 8 ? 0 : std::exp2(-4 - 12 * std::abs(unit()));
@@ -104,11 +99,11 @@ class RandomSurface {
     const std::size_t picked = random_() % (n_ * n_);
     std::vector<Positions> ends;
     for (const double t : {0.0, 1.0}) {
-      Positions x = kind_ == 7 ? sphere.t0 : formAt(t);
+      Positions x = formAt(t);
       // One vertex over its neighbours, and through them.
       if (kind_ == 4) x[picked] += Vec3(0.12, 0.09, t == 0 ? 0.03 : -0.03);
-      // Opposite sides come near or pass each other.
-      const double flat = kind_ != 2 && kind_ != 7 ? 1 : t == 0 ? 0.3 : 0.2 * unit();
+      // It becomes narrow, or turns over.
+      const double flat = kind_ != 2 ? 1 : t == 0 ? 0.3 : 0.2 * unit();
       for (Vec3& p : x) {
         p += wave * Vec3(std::sin(5 * p.y()), std::sin(4 * p.x()), std::sin(5 * p.x() + p.y() + t));
         p.y() *= flat;
@@ -131,7 +126,8 @@ class RandomSurface {
     switch (kind_) {
       case 1:
       case 2:
-        return test::tubeAt(n_, n_, bend_ + 0.3 * t * unit());
+      case 7:
+        return test::rolled(n_, 2 * bend_ + 0.3 * t * unit(), 0.1);
       case 4:
         return test::rolled(n_, 0.3 * unit());
       case 5:
@@ -228,7 +224,7 @@ TEST(UnfoldedProperty, WhatIsCertifiedHasNoContact) {
   }
   std::cout << rounds << " surfaces: " << certified << " certified, " << touching << " that touch themselves; " << asked
             << " pairs asked of the oracle\n";
-  EXPECT_GT(20 * certified, rounds) << "else nothing is tested";
+  EXPECT_GT(10 * certified, rounds) << "else nothing is tested";
   EXPECT_GT(4 * touching, rounds);
   EXPECT_GT(asked, 1000u);
 }

@@ -1,41 +1,14 @@
-// Surfaces that fold in one part of them only, or are no disk.
+// Surfaces that fold in one part of them only.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "dccd/topology.h"
+#include "dccd/types.h"
 
 namespace dccd {
 namespace test {
-
-/// A grid whose columns go round and meet again.
-inline Topology tube(std::size_t rings, std::size_t around) {
-  std::vector<Face> faces;
-  for (std::size_t r = 0; r + 1 < rings; ++r) {
-    for (std::size_t k = 0; k < around; ++k) {
-      const Index a = static_cast<Index>(r * around + k), b = static_cast<Index>(r * around + (k + 1) % around);
-      const Index c = static_cast<Index>(a + around), d = static_cast<Index>(b + around);
-      faces.push_back({a, c, b});
-      faces.push_back({b, c, d});
-    }
-  }
-  return Topology::fromTriangles(rings * around, faces);
-}
-
-inline Positions tubeAt(std::size_t rings, std::size_t around, double bend) {
-  Positions x;
-  for (std::size_t r = 0; r < rings; ++r) {
-    for (std::size_t k = 0; k < around; ++k) {
-      const double along = 4.0 * static_cast<double>(r) / static_cast<double>(rings);
-      const double angle = 2 * M_PI * static_cast<double>(k) / static_cast<double>(around);
-      const double far = 1 / bend - std::cos(angle);
-      x.emplace_back(1 / bend - far * std::cos(along * bend), std::sin(angle), far * std::sin(along * bend));
-    }
-  }
-  return x;
-}
 
 /// A sheet of which the last part, a share of it, is rolled back over the rest by `turn`, around a cylinder.
 inline Positions rolled(std::size_t side, double turn, double radius = 0.02, double share = 0.2) {
