@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "dccd/known_space.h"
 #include "dccd/voxel_surface.h"
 #include "support/data.h"
 #include "support/detector.h"
@@ -147,25 +146,6 @@ Attack checkerboard() {
                 {bodyOf("triangle", Topology::fromTriangles(3, {{0, 1, 2}}))}, {{here}, {there}}, map);
 }
 
-Attack unknownSpace() {
-  OccupiedLeaf leaf;
-  leaf.min = {32768, 32768, 32768};
-  struct State {
-    std::shared_ptr<const KnownSpace> known;
-    Topology topology = Topology::grid(100, 100);
-    Positions here = flat(100, 100, 0.05), there = here;
-  };
-  auto state = std::make_shared<State>();
-  state->known = KnownSpace::build(0.01, {leaf});
-  for (Vec3& p : state->there) p += Vec3(0.1, 0.2, 1);
-  return {"unknown space: a cloth of 5 m that moves by 1 m, voxels of 10 mm",
-          [state](std::size_t, const Deadline& deadline) {
-            const SweptSpace swept = state->known->sweptSpace(state->topology, state->here, state->there, nullptr,
-                                                              KnownSpace::MOST_BLOCKS, deadline);
-            return !swept.complete;
-          }};
-}
-
 Attack realScene(const std::string& name) {
   const test::SceneData scene = test::readScene(name);
   Positions t0, t1;
@@ -198,7 +178,6 @@ std::vector<Attack> attacks(const std::vector<std::string>& scenes) {
   all.push_back(coincidentMeshes());
   all.push_back(crumpledSheets(random));
   all.push_back(checkerboard());
-  all.push_back(unknownSpace());
   for (const std::string& scene : scenes) all.push_back(realScene(scene));
   return all;
 }

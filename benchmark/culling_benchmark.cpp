@@ -1,6 +1,6 @@
 // What the certificates of surfaces that do not fold buy: whole steps with and without them, in processor time of runs
-// in turn, on a cloth that hardly folds, on what folds in one place or is closed, on what folds everywhere, and on
-// recorded scenes. Contacts are compared before a time is written.
+// in turn, on a cloth that hardly folds, on what folds in one place or everywhere, and on recorded scenes. Contacts are
+// compared before a time is written.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -68,7 +68,7 @@ double processorMs() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_P
 struct Run {
   double ms = 0;
   std::size_t contacts = 0, certified = 0;
-  std::uint64_t parts = 0, looked_at = 0;
+  std::uint64_t looked_at = 0;
 
   void add(test::Detector& detector, const Step& step) {
     const double begin = processorMs();
@@ -76,7 +76,6 @@ struct Run {
     ms += processorMs() - begin;
     contacts += outcome.contacts.size();
     certified += outcome.stats.unfolded_bodies;
-    parts = std::max(parts, outcome.stats.unfolded_parts);
     looked_at += outcome.stats[Stage::BROAD_PHASE].in / (simd::GROUP * simd::GROUP);
   }
 };
@@ -120,7 +119,6 @@ nlohmann::json measure(const Case& c, int repeat) {
           {"steps", steps.size()},
           {"contacts", last[0].contacts},
           {"certified", last[1].certified},
-          {"parts", last[1].parts},
           {"cluster_pairs", static_cast<double>(last[0].looked_at) / count},
           {"looked_at", static_cast<double>(last[1].looked_at) / count},
           {"without_ms", spread(times[0])},
@@ -137,22 +135,16 @@ int main(int argc, char** argv) {
   using namespace dccd::benchmarks;
   std::string out;
   int repeat = 25;
-  CLI::App app("Times the step with and without the culling of surfaces, and parts of them, that do not fold.");
+  CLI::App app("Times the step with and without the culling of surfaces that do not fold.");
   app.add_option("--out", out, "JSON file to write")->required();
   app.add_option("--repeat", repeat, "runs of each case")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
-    std::vector<Case> cases{
-        wavingCloth(101), wavingCloth(216),
-        made("sheet with a fold over a tenth", Topology::grid(101, 101), test::rolled(101, 2.8, 0.02, 0.1),
-             test::rolled(101, 3, 0.02, 0.1)),
-        made("sheet with a fold over a tenth", Topology::grid(216, 216), test::rolled(216, 2.8, 0.02, 0.1),
-             test::rolled(216, 3, 0.02, 0.1)),
-        made("bending tube", test::tube(101, 100), test::tubeAt(101, 100, 0.1), test::tubeAt(101, 100, 0.12))};
-    for (const std::size_t side : {80, 160}) {
-      const test::Glove glove(side);
-      cases.push_back(made("bending glove", glove.topology, glove.curled(0.3), glove.curled(0.33)));
-    }
+    std::vector<Case> cases{wavingCloth(101), wavingCloth(216),
+                            made("sheet with a fold over a tenth", Topology::grid(101, 101),
+                                 test::rolled(101, 2.8, 0.02, 0.1), test::rolled(101, 3, 0.02, 0.1)),
+                            made("sheet with a fold over a tenth", Topology::grid(216, 216),
+                                 test::rolled(216, 2.8, 0.02, 0.1), test::rolled(216, 3, 0.02, 0.1))};
     if (!test::dataDir().empty()) {
       const std::string folder = test::dataDir() + "/scenes/cloth-ball/";
       const test::PlyMesh first = test::readPly(folder + "frame_0.ply"), second = test::readPly(folder + "frame_1.ply");

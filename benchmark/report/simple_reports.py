@@ -255,12 +255,12 @@ def write_budget(folder, result):
 
 
 def write_culling(folder, result):
-    header = ["case", "triangles", "steps", "certified", "parts", "contacts", "pairs of clusters a step", "looked at", "without, median ms a step",
+    header = ["case", "triangles", "steps", "certified", "contacts", "pairs of clusters a step", "looked at", "without, median ms a step",
               "with, median ms", "ratio (quartiles)"]
     rows = []
     for r in result["runs"]:
         q = r["ratio"]
-        rows.append([r["case"], str(r["triangles"]), str(r["steps"]), str(r["certified"]), str(r["parts"]), str(r["contacts"]),
+        rows.append([r["case"], str(r["triangles"]), str(r["steps"]), str(r["certified"]), str(r["contacts"]),
                      "%.0f" % r["cluster_pairs"], "%.0f" % r["looked_at"],
                      "%.3g" % r["without_ms"]["median"], "%.3g" % r["with_ms"]["median"],
                      "%.2f (%.2f to %.2f)" % (q["median"], q["quartile_1"], q["quartile_3"])])

@@ -71,8 +71,6 @@ class DCCD_EXPORT History {
 
   /// Nothing is carried over any more: after a seam, a reset, or a step that threw (which clears by itself).
   void clear();
-  /// The next step begins where `other` ended, aside from all steps of this history; `other` must live until then.
-  void beginAt(History& other);
   /// Nothing is known of a last step: what clear() leaves, and what a new history has.
   bool isClear() const;
   /// Pairs from which the minimum separation is left out; in the order of the bodies, kinds, features. Changes with the

@@ -36,7 +36,6 @@ struct EffectScene {
   double look_ahead_s = 0;
   bool clearance_wanted = false;      ///< by a parameter, or a subscriber to distances
   bool unknown_space_counts = false;  ///< unknown_space is not `free`
-  bool earliest_only = false;         ///< later contacts than the first are not looked for
 };
 
 struct EffectDecision {

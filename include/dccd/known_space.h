@@ -1,5 +1,4 @@
-// What a map knows: which voxels it has seen, occupied or free. For scenes in which the unknown counts as an obstacle,
-// or in which its share of the swept volume is reported.
+// What a map knows: which voxels it has seen, occupied or free. For scenes in which the unknown counts as an obstacle.
 #pragma once
 
 #include <cstddef>
@@ -7,25 +6,12 @@
 #include <memory>
 #include <vector>
 
-#include "dccd/deadline.h"
 #include "dccd/export.h"
 #include "dccd/tolerances.h"
-#include "dccd/topology.h"
 #include "dccd/types.h"
 #include "dccd/voxel_surface.h"
 
 namespace dccd {
-
-/// How much of what a mesh sweeps a map does not know, in voxels of the finest level.
-struct SweptSpace {
-  std::uint64_t voxels = 0;   ///< voxels that the swept bounds of faces (of a polyline: edges) touch, each once
-  std::uint64_t unknown = 0;  ///< of those, the ones that the map does not know
-  bool complete = true;       ///< false: the sweep was larger than the limit, and only a part of it was counted
-  /// Of what was counted, which is all only where it is complete.
-  double unknownFraction() const {
-    return voxels == 0 ? 0.0 : static_cast<double>(unknown) / static_cast<double>(voxels);
-  }
-};
 
 /// Immutable once built; safe from several threads.
 class DCCD_EXPORT KnownSpace {
@@ -47,13 +33,6 @@ class DCCD_EXPORT KnownSpace {
   /// std::invalid_argument for a crop box that is not finite.
   std::vector<OccupiedLeaf> unknownLeaves(const Box& crop_m,
                                           std::size_t max_leaves = tolerance::MAX_UNKNOWN_LEAVES) const;
-
-  static constexpr std::size_t MOST_BLOCKS = 1'000'000;
-  /// Counts what the mesh's swept bounds touch. vertex_active as for ObstacleCheck::run. limit: blocks of 4^3
-  /// voxels, each once however many faces touch it. Not complete, too, when it would not be done by the deadline.
-  SweptSpace sweptSpace(const Topology& topology, const Positions& map_t0, const Positions& map_t1,
-                        const std::uint8_t* vertex_active, std::size_t limit = MOST_BLOCKS,
-                        const Deadline& deadline = {}) const;
 
  private:
   struct DCCD_HIDDEN Impl;

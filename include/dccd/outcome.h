@@ -53,7 +53,7 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
 /// What a scene can call for, and a user can set (doc/interface.md). Each pair and each moment counts for one effect
 /// alone. The second name of a row is that of the setting and of the published fields. Those are pairs in and out, but
 /// - rigid_bodies: bodies that turn, and how often one was placed for a part of the step;
-/// - unknown_space: voxels that the step sweeps, and those that the map does not know;
+/// - unknown_space: zeros, for the map's thread makes an obstacle of it;
 /// - minimum_separation: pairs that carry a distance into the elementary test, and no uncertainty;
 /// - tracker_noise: pairs whose vertices bring an uncertainty radius;
 /// - look_ahead: of the last prediction, pairs past the filters, and contacts;
@@ -101,8 +101,6 @@ struct StepStats {
   std::uint64_t undecided = 0, initial = 0, leaving = 0;
   std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
-  std::uint64_t unfolded_parts = 0;   ///< parts of surfaces that certainly do not fold within themselves
-  std::uint64_t unfolded_pairs = 0;   ///< pairs of clusters, or of groups of them, not looked at for that
   std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
   std::uint64_t bodies_far = 0;        ///< near nothing that they are tested against; no bounds are computed
@@ -128,8 +126,6 @@ struct StepStats {
   COUNTER(unchecked_vertices, true) \
   COUNTER(unchecked_faces, true)    \
   COUNTER(unfolded_bodies, false)   \
-  COUNTER(unfolded_parts, false)    \
-  COUNTER(unfolded_pairs, false)    \
   COUNTER(bodies_refitted, false)   \
   COUNTER(bodies_kept, false)       \
   COUNTER(body_pairs, false)        \
@@ -228,8 +224,7 @@ struct Outcome : Findings {
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
-  double unknown_fraction = 0;         ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
-  std::size_t substeps = 0;            ///< parts that the step was cut into
+  std::size_t substeps = 0;                                                  ///< parts that the step was cut into
   Touching touching = Touching::NONE;  ///< of this step alone; assuranceOf() knows what lasts
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
   std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not

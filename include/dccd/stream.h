@@ -70,11 +70,8 @@ class DCCD_EXPORT Monitor {
   ~Monitor();
 
   const MonitorOptions& options() const;
-  /// What a step may take, unknown space included, so that a prediction has its share of the time [ms]; 0: as long as
-  /// it takes.
+  /// What a step may take, so that a prediction has its share of the time [ms]; 0: as long as it takes.
   double stepMs() const;
-  /// Until when what else belongs to the outcome's step may take, as long as cancel() is not called.
-  Deadline restOf(const Outcome& outcome) const;
   void setOptions(const MonitorOptions& options);  ///< from the next step on; clock_body must stay
   const std::vector<Body>& bodies() const;
 

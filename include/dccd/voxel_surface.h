@@ -57,8 +57,6 @@ struct ObstacleOptions {
   double minimum_separation_m = 0;  ///< contact when closer than this; conservative only when > 0
 };
 
-class LeafObserver;
-
 /// What ObstacleCheck is asked: one body's step in the map's frame. It names what must live until the answer.
 struct ObstacleQuery {
   const VoxelSurface& surface;
@@ -73,7 +71,6 @@ struct ObstacleQuery {
   Deadline deadline{};  ///< features that have not been begun by then are left out
   /// So many contacts at most are appended; of more, those found first.
   std::size_t most_found = std::numeric_limits<std::size_t>::max();
-  LeafObserver* observer = nullptr;  ///< null: none (obstacle/leaf_observer.h)
 };
 
 /// Mesh vertices against exposed voxel faces, mesh edges against convex voxel edges, voxel corners against mesh faces,

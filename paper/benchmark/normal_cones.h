@@ -2,7 +2,6 @@
 // its filters, asked pair by pair: the share of the candidates that it takes.
 #pragma once
 
-#include <unordered_map>
 #include <vector>
 
 #include "culling/unfolded.h"
@@ -17,7 +16,7 @@ class NormalCones {
   void setBodies(const SceneBodies& scene, const Step& guide);
   /// Steps that follow each other.
   void certify(const Step& step);
-  /// Keeps the pairs that no part of a surface holds; returns how many.
+  /// Keeps the pairs that are not of one surface that certainly does not fold; returns how many.
   std::size_t keep(PairKind kind, const Quad* pairs, std::size_t count, Quad* out) const;
 
  private:
@@ -25,8 +24,7 @@ class NormalCones {
     Index first = 0, last = 0;  ///< vertices
     Body body;
     SceneArrays scene;
-    std::vector<Unfolded> unfolded;                        ///< of the one body
-    std::unordered_map<std::uint64_t, Index> clusters[3];  ///< of features, by FeatureKind
+    std::vector<Unfolded> unfolded;  ///< of the one body
   };
   std::vector<Surface> surfaces_;
   std::vector<Index> surface_of_;  ///< of a vertex; NO_INDEX: none

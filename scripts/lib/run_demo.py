@@ -149,10 +149,12 @@ def write_report(folder, summary, arrays, stats, start):
                                 ['%.6f' % v for v in (c.point.x, c.point.y, c.point.z)])
     with open(folder / 'steps.csv', 'w', newline='') as stream:
         writer = csv.writer(stream)
-        names = [n for n in StepStats.__slots__ if n != 'header']
-        writer.writerow(['stamp_s'] + names)
+        names = [n for n in StepStats.__slots__ if n not in ('header', 'stages')]
+        parts = {'in': 'count_in', 'out': 'count_out', 'ms': 'ms'}
+        writer.writerow(['stamp_s'] + names + [row.name + '_' + part for row in (stats[0].stages if stats else []) for part in parts])
         for s in stats:
-            writer.writerow(['%.6f' % (s.header.stamp.to_sec() - start)] + [getattr(s, n) for n in names])
+            writer.writerow(['%.6f' % (s.header.stamp.to_sec() - start)] + [getattr(s, n) for n in names] +
+                            [getattr(row, field) for row in s.stages for field in parts.values()])
 
 
 def print_summary(summary, folder):

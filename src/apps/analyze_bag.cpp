@@ -75,9 +75,8 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
   if (!summary.look_ahead) return "";
   const LookAheadSummary& s = *summary.look_ahead;
   std::ostringstream text;
-  text << "look-ahead: " << s.compared << " predictions came true";
-  if (s.compared > 0) text << ", median error " << s.median_error_s << " s, 95 % " << s.p95_error_s << " s";
-  text << "; " << s.not_observed << " not observed, " << s.not_predicted << " contacts not predicted\n";
+  text << "look-ahead: " << s.came_true << " predictions came true, " << s.not_observed << " were not observed, "
+       << s.not_predicted << " contacts not predicted\n";
   return text.str();
 }
 
@@ -183,7 +182,7 @@ int analyze(const Arguments& a) {
   options.show_progress = !a.quiet;
   BagReplay replay(a.bag, config, options);
   Report report(a.report);  // makes the folder, in which the results may lie, too
-  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
+  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out);
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {

@@ -23,7 +23,7 @@ struct Arguments {
 
 Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
-  app.add_option("FILE", a.file, "a file that ~record_step, a surprise or the crash handler wrote")->required();
+  app.add_option("FILE", a.file, "a file that ~record_step or a surprise wrote")->required();
   app.add_option(
       "--pair", a.pairs,
       "the pair's way through the stages: VF:v,a,b,c (vertex, face), EE:a,b,c,d (two edges), or with the map "

@@ -52,7 +52,7 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.monitor.own_voxels_lag_s =
       reader.number("own_voxels_lag_s", config.monitor.own_voxels_lag_s, 0, tolerance::OWN_PATH_S);
   config.monitor.own_voxels_trust = reader.choice("own_voxels_doubt", "unproved", {"unproved", "trust"}) == "trust";
-  config.unknown_space = choiceOf(reader, "unknown_space", UnknownSpace::FREE, {"free", "occupied", "report"});
+  config.unknown_space = choiceOf(reader, "unknown_space", UnknownSpace::FREE, {"free", "occupied"});
   const ParameterTree& box = reader.raw("unknown_box");
   if (box.isSet()) {
     const auto n = reader.numbers(box, "unknown_box", 6);
@@ -69,7 +69,7 @@ void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) 
   if (!config.ownsVoxels() || config.unknown_space != UnknownSpace::OCCUPIED) return;
   reader.fail("own_voxels_m",
               "is above 0, but with unknown_space: occupied a body's own voxels cannot be told from what "
-              "is unknown; write unknown_space: report, or own_voxels_m: 0");
+              "is unknown; write unknown_space: free, or own_voxels_m: 0");
 }
 
 const std::string& MonitorConfig::liveMapName() const { return cloud_named ? cloud_topic : octomap_topic; }

@@ -72,11 +72,10 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
   monitor.detector.max_contacts = reader.integer("max_contacts", monitor.detector.max_contacts, 1, MANY);
   monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
-  monitor.detector.earliest_only = reader.get("earliest_only", false);
-  if (monitor.detector.earliest_only && reader.has("expected_contacts")) {
-    reader.fail("earliest_only",
-                "is true beside expected_contacts: the first contact may be an expected one, which "
-                "would hide all others; remove one of both");
+  if (reader.has("earliest_only")) {
+    reader.fail(
+        "earliest_only",
+        "is gone: a monitor looks for all contacts; remove it, or ask the library or Python for the first alone");
   }
   for (const ParameterTree& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);
@@ -190,7 +189,7 @@ void applyEffects(MonitorConfig& config) {
   }
   if (off(Effect::START_STATE)) config.monitor.detector.check_start_state = false;
   if (off(Effect::LOOK_AHEAD)) config.monitor.look_ahead_s = 0;
-  config.monitor.detector.patches = !off(Effect::PATCHES) && !config.monitor.detector.earliest_only;
+  config.monitor.detector.patches = !off(Effect::PATCHES);
   if (off(Effect::UNKNOWN_SPACE)) config.unknown_space = UnknownSpace::FREE;
 }
 

@@ -20,7 +20,7 @@
 
 namespace dccd {
 
-enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
+enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED };
 enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
 struct BodyConfig {
   Body body;

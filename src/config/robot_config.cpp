@@ -149,11 +149,6 @@ void readHolds(const ParameterReader& reader, const RobotConfig& asked, MonitorC
       config.holds.push_back(std::move(hold));
     }
   }
-  if (!config.holds.empty() && config.monitor.detector.earliest_only) {
-    reader.fail("robot/holds",
-                "is given beside earliest_only: the first contact may be the hand's, which would hide all others; "
-                "remove one of both");
-  }
 }
 
 }  // namespace

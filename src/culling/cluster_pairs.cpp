@@ -49,16 +49,9 @@ double tocBoundOfRest(const TreePair& trees, std::size_t level, const std::vecto
 }  // namespace
 
 SearchRest superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs,
-                             std::vector<std::uint32_t>& scratch, std::size_t max_pairs, const Deadline& deadline,
-                             std::uint64_t* left_out) {
+                             std::vector<std::uint32_t>& scratch, std::size_t max_pairs, const Deadline& deadline) {
   SearchRest rest;
   pairs.assign({0, 0});
-  const auto leaveOut = [&](std::size_t level, std::uint32_t* found, std::size_t count) {
-    const std::size_t left = trees.leaveOut(level, found, count);
-    if (left_out) *left_out += count - left;
-    return left;
-  };
-  pairs.resize(2 * leaveOut(trees.a->height() - 1, pairs.data(), 1));
   for (std::size_t l = trees.a->height() - 1; l > 1; --l) {
     scratch.clear();
     std::size_t done = 0;
@@ -77,7 +70,7 @@ SearchRest superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& 
           trees.viewA(l), trees.viewB(l), pairs.data() + 2 * done, std::min(count - done, PAIRS_PER_LOOK_AT_THE_CLOCK),
           trees.self, simd::Diagonal::UPPER_WITH_DIAGONAL, trees.span.times != Times::BOTH, scratch.data() + used, STEP,
           &consumed);
-      scratch.resize(used + 2 * leaveOut(l - 1, scratch.data() + used, found));
+      scratch.resize(used + 2 * found);
       done += consumed;
     }
     std::swap(pairs, scratch);

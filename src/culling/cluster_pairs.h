@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "culling/cluster_tree.h"
-#include "culling/unfolded.h"
 #include "dccd/deadline.h"
 
 namespace dccd {
@@ -18,17 +17,11 @@ struct TreePair {
   bool self = false;
   Span span;
   bool adjacent = false;  ///< both are of one body: features that share a vertex are no pair
-  /// Groups that are in one part of a surface are not looked at. Null: there are no parts.
-  const PartsOfGroups *parts_a = nullptr, *parts_b = nullptr;
   /// Of a tree and itself, at t0: all that share a vertex, where that is known; null: it is found out.
   const simd::KnownPairs* sharing = nullptr;
 
   simd::GroupsView viewA(std::size_t level) const { return a->level(level).view(span.times == Times::SWEPT); }
   simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
-  /// Takes out of flattened pairs of groups those that are not looked at; returns how many are left.
-  std::size_t leaveOut(std::size_t level, std::uint32_t* pairs, std::size_t count) const {
-    return parts_a ? leaveOutPairs(*parts_a, *parts_b, level, pairs, count) : count;
-  }
 };
 
 /// What of the pairs a search that was cut did not come to.
@@ -39,12 +32,11 @@ struct SearchRest {
 
 /// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads. Of more than max_pairs
 /// that many are kept, the first in the trees' order; the rest is bounded as by superclusterTocBound(). The deadline
-/// ends the search as max_pairs does; once it was over it is not asked again. left_out: counts on what the parts of a
-/// surface leave out.
+/// ends the search as max_pairs does; once it was over it is not asked again.
 SearchRest superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs,
                              std::vector<std::uint32_t>& scratch,
                              std::size_t max_pairs = std::numeric_limits<std::size_t>::max(),
-                             const Deadline& deadline = {}, std::uint64_t* left_out = nullptr);
+                             const Deadline& deadline = {});
 
 /// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
 /// overlap (to two record units) in all 8 directions at t=0. The end of the bounds when they never meet until then.
@@ -64,14 +56,11 @@ class ClusterPairStream {
     std::size_t done = 0;
     while (done < count) {
       std::size_t consumed = 0;
-      std::size_t clusters =
+      const std::size_t clusters =
           simd::testGroupPairs(trees.viewA(1), trees.viewB(1), pairs + 2 * done, count - done, trees.self,
                                simd::Diagonal::UPPER_WITH_DIAGONAL, trees.span.times != Times::BOTH, clusters_.data(),
                                CLUSTER_PAIRS, &consumed);
       done += consumed;
-      const std::size_t met = clusters;
-      clusters = trees.leaveOut(0, clusters_.data(), met);
-      cluster_pairs_left_out_ += met - clusters;
       for (std::size_t i = 0; i < clusters; ++i) {
         trees.a->needLeaves(clusters_[2 * i]);
         trees.b->needLeaves(clusters_[2 * i + 1]);
@@ -97,13 +86,12 @@ class ClusterPairStream {
   }
 
   std::uint64_t clusterPairsTested() const { return cluster_pairs_tested_; }
-  std::uint64_t clusterPairsLeftOut() const { return cluster_pairs_left_out_; }
-  void clearCounters() { cluster_pairs_tested_ = cluster_pairs_left_out_ = 0; }
+  void clearCounters() { cluster_pairs_tested_ = 0; }
 
  private:
   static constexpr std::size_t CLUSTER_PAIRS = 1024;
   std::vector<std::uint32_t> clusters_, slots_;
-  std::uint64_t cluster_pairs_tested_ = 0, cluster_pairs_left_out_ = 0;
+  std::uint64_t cluster_pairs_tested_ = 0;
 };
 
 }  // namespace dccd

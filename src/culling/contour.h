@@ -1,4 +1,4 @@
-// The border of a part of a surface, seen along a direction during a whole step.
+// The border of a surface, seen along a direction during a whole step.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -49,64 +49,36 @@ class PlanarSpan {
   std::array<double, 2> low_{HUGE_VAL, HUGE_VAL}, high_{-HUGE_VAL, -HUGE_VAL};
 };
 
-/// Whether a border meets itself at any time of a step but in the vertices that its edges have in common, and winds
-/// around no point of the plane more than once.
-///
-/// At each vertex as many edges begin as end. So the border falls into cycles that come to each of their vertices once.
-/// If no two edges meet but in common vertices, each cycle is a simple polygon at every t, which winds around a point
-/// once or not at all, always the same way round. If just one of them is counter-clockwise, the border winds around a
-/// point once, or not at all, or the other way round.
+/// A cycle of edges that comes to each of its vertices once, and whether any two of these edges meet at any time of a
+/// step but in the vertices that they have in common.
 class Contour {
  public:
-  struct Side {
-    Index from, to;
-  };
-  /// Vertices have numbers from first_vertex on.
-  explicit Contour(Index first_vertex = 0, std::size_t vertex_count = 0);
-  /// True: so it is. Else bad() says of each side whether it is one of those that stand against it; all sides where
-  /// that is not known.
-  bool isSimple(const std::vector<Side>& sides, const ViewPlane& plane, const VertexMotion* vertices);
-  const std::vector<std::uint8_t>& bad() const { return bad_; }
+  /// One edge goes from each vertex to the next, the last one to the first. At least three.
+  explicit Contour(std::vector<Index> vertices) : vertices_(std::move(vertices)) {}
+  /// True: they do not, so that it is a simple polygon at every time.
+  bool isSimple(const ViewPlane& plane, const VertexMotion* vertices);
 
  private:
   static constexpr std::size_t DIRECTIONS = 8;  ///< of the plane, 22.5 degrees apart
-  /// Of a vertex of the border: its sides are listed, one after another.
   struct Corner {
     PlanarSpan::Point point;
-    Index vertex;
-    std::uint32_t first_out, first_in;  ///< sides that begin and end here
-    std::uint32_t next_out;             ///< of the walk
-    std::uint32_t on_path;
     std::array<double, 2 * DIRECTIONS> projections;  ///< at t=0, then at t=1
   };
-  struct Ends {
-    std::uint32_t from, to;           ///< corners
-    std::uint32_t next_out, next_in;  ///< sides with the same one
-  };
-  /// A side and what it sweeps, along a direction and across it.
+  /// An edge and what it sweeps, along a direction and across it.
   struct Swept {
     double low, high, across_low, across_high;
-    std::uint32_t side;
+    std::size_t edge;
   };
 
-  std::uint32_t cornerAt(Index vertex, const ViewPlane& plane, const VertexMotion* vertices, PlanarSpan& span);
-  void findCycles();
-  void testVertices();
+  std::size_t next(std::size_t i) const { return i + 1 < vertices_.size() ? i + 1 : 0; }
   std::size_t widestDirection() const;
-  bool areApart(const Ends& a, const Ends& b, double margin) const;
-  bool testSweep();
-  void testOrientation();
-  bool turnsAt(const PlanarSpan::Point& before, const PlanarSpan::Point& at, const PlanarSpan::Point& after) const;
+  bool areApart(std::size_t a, std::size_t b, double margin) const;
+  bool turnsEverywhere(double margin) const;
+  bool staysApart(double margin);
 
-  Index first_vertex_;
-  std::vector<std::uint32_t> corner_of_;  // per vertex, as of the last call
-  std::vector<Corner> corners_;
-  std::vector<Ends> ends_;                           // per side
-  std::vector<std::uint32_t> cycles_, cycle_begin_;  // sides, cycle by cycle
-  std::vector<std::uint32_t> path_;
+  std::vector<Index> vertices_;
+  std::vector<Corner> corners_;  // per vertex, where its edge begins
   std::vector<Swept> swept_;
-  std::vector<std::uint8_t> bad_;
-  double error_ = 0, product_error_ = 0;
 };
 
 }  // namespace dccd

@@ -11,9 +11,9 @@
 #include <ros/time.h>
 #include <rosbag/bag.h>
 
-#include "dccd/look_ahead_score.h"
 #include "node/map_loader.h"
 #include "node/monitor_pipeline.h"
+#include "report/look_ahead_score.h"
 
 namespace dccd {
 

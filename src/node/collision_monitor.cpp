@@ -76,7 +76,6 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       diagnostics(private_node.getNamespace()),
       diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),
       log(node, private_node.getNamespace(), config),
-      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
       disabled_frames(config.bodies.size()) {
   // Of a static body the newest frame alone counts.
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
@@ -212,13 +211,6 @@ CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeH
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
 
-void CollisionMonitor::takeProcess() {
-  impl_->owns_process = true;
-  try {
-    impl_->recorder.installCrashHandler();
-  } catch (const std::runtime_error& error) {
-    ROS_WARN_STREAM("a crash will not be recorded: " << error.what());
-  }
-}
+void CollisionMonitor::takeProcess() { impl_->owns_process = true; }
 
 }  // namespace dccd

@@ -21,8 +21,7 @@ class CollisionMonitor {
   CollisionMonitor(const CollisionMonitor&) = delete;
   CollisionMonitor& operator=(const CollisionMonitor&) = delete;
 
-  /// For the program whose process this is: a crash writes the last step (doc/troubleshooting.md), and the process ends
-  /// within a second of the monitor's end, whatever still runs.
+  /// For the program whose process this is: it ends within a second of the monitor's end, whatever still runs.
   void takeProcess();
 
  private:

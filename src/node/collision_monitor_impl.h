@@ -47,7 +47,6 @@ struct CollisionMonitor::Impl {
   Diagnostics diagnostics;
   ros::Publisher diagnostics_publisher;
   MonitorLog log;
-  LookAheadScore look_ahead;
   std::unique_ptr<MapLoader> maps;
 
   ros::CallbackQueue input_callbacks, service_callbacks;

@@ -35,7 +35,6 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   scene_.map_seen = config.takesMapFileAlone();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
   promised_ = scene_.clearance_wanted = config.promises();
-  scene_.earliest_only = config.monitor.detector.earliest_only;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
   plan_ = EffectPlan(scene_, settings_);
 }

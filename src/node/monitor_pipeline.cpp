@@ -1,8 +1,6 @@
 #include "node/monitor_pipeline.h"
 
 #include <algorithm>
-#include <chrono>
-#include <limits>
 #include <new>
 #include <utility>
 
@@ -48,37 +46,6 @@ std::string MonitorPipeline::phaseInWords() const {
   if (expected.empty()) return text + ", no contact is expected";
   for (std::size_t i = 0; i < expected.size(); ++i) text += (i == 0 ? ", expected: " : "; ") + expected[i];
   return text;
-}
-
-void MonitorPipeline::measureUnknown(Outcome& outcome) const {
-  if (config_.unknown_space != UnknownSpace::REPORT || !outcome.answered || !outcome.obstacle) return;
-  const std::shared_ptr<const KnownSpace>& known = outcome.step->map.known;
-  if (!known) return;
-  const auto start = std::chrono::steady_clock::now();
-  const Deadline deadline = monitor_->restOf(outcome);
-  SweptSpace sum;
-  Positions map_t0, map_t1;
-  std::vector<std::uint8_t> active;
-  for (const Body& body : outcome.step->bodies) {
-    if (!meetsMap(body)) continue;
-    const Topology& topology = *body.topology;
-    active.assign(topology.vertexCount(), 1);
-    for (const Index v : body.vertex_mask) active[v] = 0;
-    map_t0 = *body.t0;
-    map_t1 = *body.t1;
-    transform(outcome.step->map.map_from_fixed, map_t0);
-    transform(outcome.step->map.map_from_fixed, map_t1);
-    const SweptSpace one =
-        known->sweptSpace(topology, map_t0, map_t1, active.data(), KnownSpace::MOST_BLOCKS, deadline);
-    sum.voxels += one.voxels;
-    sum.unknown += one.unknown;
-    sum.complete = sum.complete && one.complete;
-  }
-  // Of a sweep too large to be counted there is no share: that of a part may be anything.
-  outcome.unknown_fraction = sum.complete ? sum.unknownFraction() : std::numeric_limits<double>::quiet_NaN();
-  const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-  outcome.stats[Effect::UNKNOWN_SPACE] = {sum.voxels, sum.unknown, spent.count()};
-  outcome.stats.total_ms += spent.count();
 }
 
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
@@ -184,7 +151,6 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   nameMissing(outcome);
   nameUnwatched(outcome);
   nameNewerMap(outcome);
-  measureUnknown(outcome);
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
     promises_.follow(outcome);

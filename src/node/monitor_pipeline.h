@@ -203,8 +203,6 @@ class MonitorPipeline {
   /// A fixed frame that was learnt is forgotten, and with it where things were in it; frames of streams are counted
   /// under the status.
   void learnAnew(StepStatus status);
-  /// unknown_space: report. How much of what the step swept the map does not know.
-  void measureUnknown(Outcome& outcome) const;
   /// A static body's frame waits on.
   void keep(std::size_t body);
   /// The end has come for what still waits.

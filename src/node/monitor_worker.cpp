@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "output/advice.h"
+#include "report/look_ahead_score.h"
 
 namespace dccd {
 namespace {
@@ -140,7 +141,6 @@ void CollisionMonitor::Impl::lookIntoSilence() {
 
 StatsContext CollisionMonitor::Impl::statsContext() const {
   StatsContext context = pipeline.counters();
-  if (config.monitor.look_ahead_s > 0) context.look_ahead = look_ahead.summary();
   context.steps_unpublished = steps_unpublished;
   context.maps_received = maps ? maps->received() : 0;
   context.frames_handed_over = frames_handed_over;
@@ -205,7 +205,6 @@ void CollisionMonitor::Impl::logEffects() {
 
 void CollisionMonitor::Impl::predict(Outcome& outcome) {
   if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
-  look_ahead.observe(outcome);
   // Nothing to go on from, which whoever listens to predictions alone must hear, too.
   if (!outcome.answered) return publishPrediction(outcome);
   Outcome prediction;
@@ -216,7 +215,6 @@ void CollisionMonitor::Impl::predict(Outcome& outcome) {
     prediction.reason = error.what();
     prediction.start_ns = prediction.stamp_ns = outcome.stamp_ns;
   }
-  look_ahead.predict(prediction);
   outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
   publishPrediction(prediction);
 }

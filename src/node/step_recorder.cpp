@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <stdexcept>
 
-#include "node/crash_handler.h"
 #include "node/map_memory.h"
 
 namespace dccd {
@@ -32,8 +30,7 @@ StepRecorder::StepRecorder(const MonitorConfig& config, Monitor& monitor, const 
     : folder_(config.record_folder.empty() ? rosHome() + "/deformable_ccd" : config.record_folder),
       owner_(inFileName(node)) {
   if (config.record_steps == 0) return;
-  recorder_ =
-      std::make_unique<FlightRecorder>(config.record_steps, folder_, &crashImage(), owner_, recordedMaps(config));
+  recorder_ = std::make_unique<FlightRecorder>(config.record_steps, folder_, owner_, recordedMaps(config));
   monitor.setListener(recorder_.get());
 }
 
@@ -58,13 +55,5 @@ bool StepRecorder::record(std::string& message) {
 }
 
 std::string StepRecorder::takeSurprise() { return recorder_ ? recorder_->takeSurprise() : std::string(); }
-
-void StepRecorder::installCrashHandler() {
-  if (!recorder_) return;
-  std::error_code error;
-  std::filesystem::create_directories(folder_, error);
-  if (error) throw std::runtime_error("record_folder " + folder_ + " cannot be made: " + error.message());
-  dccd::installCrashHandler(folder_, owner_);
-}
 
 }  // namespace dccd

@@ -21,9 +21,6 @@ class StepRecorder {
   bool record(std::string& message);
   /// One sentence for the log about an answer that contradicts its own promises; empty: none.
   std::string takeSurprise();
-  /// See node/crash_handler.h. Nothing where the recorder is off. Throws std::runtime_error naming the folder when it
-  /// cannot be made.
-  void installCrashHandler();
 
  private:
   std::string folder_, owner_;

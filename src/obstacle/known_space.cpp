@@ -1,7 +1,6 @@
 #include "dccd/known_space.h"
 
 #include <algorithm>
-#include <chrono>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -44,79 +43,10 @@ bool visitUnknown(const VoxelTree& tree, const OccupiedLeaf& cube, const KeyBox&
 
 constexpr OccupiedLeaf WHOLE_MAP{{0, 0, 0}, VoxelTree::KEYS};
 
-/// A block of 4^3 voxels and which of them are touched.
-using TouchedBlock = std::pair<std::uint64_t, std::uint64_t>;
-
-std::uint64_t packBlock(std::int32_t x, std::int32_t y, std::int32_t z) {
-  return static_cast<std::uint64_t>(x) << 32 | static_cast<std::uint64_t>(y) << 16 | static_cast<std::uint64_t>(z);
-}
-
-/// Sorts them, each block once.
-void uniteBlocks(std::vector<TouchedBlock>& blocks) {
-  std::sort(blocks.begin(), blocks.end());
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (kept > 0 && blocks[kept - 1].first == blocks[i].first) {
-      blocks[kept - 1].second |= blocks[i].second;
-    } else {
-      blocks[kept++] = blocks[i];
-    }
-  }
-  blocks.resize(kept);
-}
-
-constexpr std::chrono::nanoseconds BLOCK_TIME(300);  // to sort a block among a million, and to count its voxels
-constexpr std::size_t FEATURES_PER_LOOK_AT_THE_CLOCK = 32;
-
-/// How many blocks can be sorted and counted before the deadline.
-std::size_t blocksUntil(const Deadline& deadline) {
-  const auto left = deadline.at() - Deadline::Clock::now();
-  return static_cast<std::size_t>(std::max<std::int64_t>(0, left / BLOCK_TIME));
-}
-
-/// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to
-/// twice the limit is held before they are united, so that this comes seldom.
-bool addBlocks(const KeyBox& keys, std::size_t limit, std::vector<TouchedBlock>& blocks) {
-  std::size_t count = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    count *= static_cast<std::size_t>((keys.hi[axis] >> 2) - (keys.lo[axis] >> 2) + 1);
-  }
-  if (count > limit) return false;
-  if (count > 2 * limit - blocks.size()) {
-    uniteBlocks(blocks);
-    if (blocks.size() > limit) return false;
-  }
-  const auto range = [&keys](int axis, std::int32_t block) {
-    const std::int32_t lo = std::max(0, keys.lo[axis] - 4 * block), hi = std::min(3, keys.hi[axis] - 4 * block);
-    return RANGE_MASKS[axis][lo][hi];
-  };
-  for (std::int32_t z = keys.lo[2] >> 2; z <= keys.hi[2] >> 2; ++z) {
-    for (std::int32_t y = keys.lo[1] >> 2; y <= keys.hi[1] >> 2; ++y) {
-      const std::uint64_t yz = range(1, y) & range(2, z);
-      for (std::int32_t x = keys.lo[0] >> 2; x <= keys.hi[0] >> 2; ++x) {
-        blocks.emplace_back(packBlock(x, y, z), range(0, x) & yz);
-      }
-    }
-  }
-  return true;
-}
-
 }  // namespace
 
 struct KnownSpace::Impl {
   Impl(double resolution, const std::vector<OccupiedLeaf>& leaves) : resolution_m(resolution), tree(leaves) {}
-
-  /// The known voxels of a block of 4^3.
-  std::uint64_t knownCells(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    const std::uint32_t parent = tree.find(1, x >> 2, y >> 2, z >> 2);
-    if (parent == VoxelTree::NONE) {
-      return tree.coverage(4 * x, 4 * y, 4 * z, 4) == Coverage::FULL ? ~std::uint64_t{0} : 0;
-    }
-    const VoxelTree::Node& node = tree.nodes(1)[parent];
-    const unsigned bit = cellBit(x, y, z);
-    if (node.child >> bit & 1) return tree.nodes(0)[node.childAt(bit)].full;
-    return node.full >> bit & 1 ? ~std::uint64_t{0} : 0;
-  }
 
   double resolution_m;
   VoxelTree tree;
@@ -164,46 +94,6 @@ std::vector<OccupiedLeaf> KnownSpace::unknownLeaves(const Box& crop_m, std::size
                             std::to_string(max_leaves) + "; make the box smaller");
   }
   return leaves;
-}
-
-SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map_t0, const Positions& map_t1,
-                                  const std::uint8_t* vertex_active, std::size_t limit,
-                                  const Deadline& deadline) const {
-  SweptSpace swept;
-  std::vector<TouchedBlock> blocks;
-  std::size_t features = 0;
-  // addBlocks() may hold twice as many as it is allowed, and all that it holds is sorted and counted in the end.
-  const std::size_t most_blocks = deadline.isNever() ? limit : std::min(limit, blocksUntil(deadline) / 2);
-  const auto isLate = [&] {
-    return deadline.isOver() || (!deadline.isNever() && blocksUntil(deadline) < blocks.size());
-  };
-  const auto add = [&](const auto& feature) {
-    if (swept.complete && features++ % FEATURES_PER_LOOK_AT_THE_CLOCK == 0) swept.complete = !isLate();
-    if (!swept.complete) return;
-    Box box;
-    for (const Index v : feature) {
-      if (vertex_active != nullptr && vertex_active[v] == 0) return;
-      if (!map_t0[v].allFinite() || !map_t1[v].allFinite()) return;
-      box.min = box.min.cwiseMin(map_t0[v]).cwiseMin(map_t1[v]);
-      box.max = box.max.cwiseMax(map_t0[v]).cwiseMax(map_t1[v]);
-    }
-    KeyBox keys;
-    if (touchedKeys(box, impl_->resolution_m, keys) && !addBlocks(keys, most_blocks, blocks)) swept.complete = false;
-  };
-  for (const Face& face : topology.faces()) add(face);
-  if (!topology.hasFaces()) {
-    for (const Edge& edge : topology.edges()) add(edge);
-  }
-  swept.complete = swept.complete && !isLate();
-  if (!swept.complete) return swept;
-  uniteBlocks(blocks);
-  swept.complete = blocks.size() <= most_blocks;
-  for (const auto& [block, touched] : blocks) {
-    const auto at = [packed = block](int shift) { return static_cast<std::int32_t>(packed >> shift & 0xffff); };
-    swept.voxels += bitCount(touched);
-    swept.unknown += bitCount(touched & ~impl_->knownCells(at(32), at(16), at(0)));
-  }
-  return swept;
 }
 
 }  // namespace dccd

@@ -10,7 +10,6 @@
 
 #include "dccd/tolerances.h"
 #include "obstacle/axis_predicates.h"
-#include "obstacle/leaf_observer.h"
 #include "obstacle/mesh_keys.h"
 #include "obstacle/obstacle_batch.h"
 
@@ -122,14 +121,6 @@ struct ObstacleCheck::Impl {
     KeyLanes lanes = of[feature[0]];
     for (std::size_t i = 1; i < feature.size(); ++i) lanes.include(of[feature[i]]);
     return lanes;
-  }
-  /// What is near the feature.
-  template <class Feature>
-  void tellObserver(const Run& run, const Feature& feature) const {
-    if (!run.query.observer) return;
-    for (const std::uint32_t leaf : near_leaves) {
-      run.query.observer->onLeaf(feature.data(), feature.size(), run.surface->tree.leaves()[leaf]);
-    }
   }
   /// Fills near_leaves with the leaves that a key box reaches, by key.
   void findLeaves(const Run& run, const KeyBox& box);

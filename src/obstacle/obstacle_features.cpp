@@ -163,7 +163,6 @@ void ObstacleCheck::Impl::runVertices(const Run& run) {
     if (near_leaves.empty()) continue;
     const bool separate = separationOf(run, std::array<Index, 1>{v}) > 0;
     if (separate && !late) sortLeaves(*run.surface, near_leaves);
-    tellObserver(run, std::array<Index, 1>{v});
     run.stats->pairs_in += near_leaves.size();
     const Vec3 &p0 = run.query.map_t0[v], &p1 = run.query.map_t1[v];
     const bool moves = p0 != p1;
@@ -246,7 +245,6 @@ void ObstacleCheck::Impl::runEdges(const Run& run) {
     run.surface->tree.visitLeavesWithEdges(unite(keys, edge).box(),
                                            [&](std::uint32_t leaf) { return addNear(run, leaf); });
     if (near_leaves.empty()) continue;
-    tellObserver(run, edge);
     run.stats->pairs_in += near_leaves.size();
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
     const double separation_m = separationOf(run, edge);
@@ -260,7 +258,6 @@ void ObstacleCheck::Impl::runEdges(const Run& run) {
 
 bool ObstacleCheck::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
   findLeaves(run, unite(start_keys, edge).box());
-  tellObserver(run, edge);
   bool inside = false;
   for (const std::uint32_t leaf : near_leaves) {
     if (isLate(run)) break;
@@ -325,7 +322,6 @@ void ObstacleCheck::Impl::runFaces(const Run& run) {
                                              [&](std::uint32_t leaf) { return addNear(run, leaf); });
     run.stats->pairs_in += near_leaves.size();
     if (near_leaves.empty()) continue;
-    tellObserver(run, face);
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
     const double separation_m = separationOf(run, face);
     const MovingBounds moving = boundsOf(points, 3, separation_m);
@@ -338,7 +334,6 @@ void ObstacleCheck::Impl::runFaces(const Run& run) {
 
 bool ObstacleCheck::Impl::faceStartsInside(const Run& run, const Face& face) {
   findLeaves(run, unite(start_keys, face).box());
-  tellObserver(run, face);
   const double *p0 = run.query.map_t0[face[0]].data(), *p1 = run.query.map_t0[face[1]].data(),
                *p2 = run.query.map_t0[face[2]].data();
   std::size_t pierced = 0;

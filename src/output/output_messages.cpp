@@ -85,25 +85,20 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
 #define DCCD_FILL_COUNTER(name, same_in_every_part) out.name = static_cast<decltype(out.name)>(stats.name);
   DCCD_STEP_COUNTERS(DCCD_FILL_COUNTER)
 #undef DCCD_FILL_COUNTER
-  out.broad_phase_in = stats[Stage::BROAD_PHASE].in;
-  out.broad_phase_out = stats[Stage::BROAD_PHASE].out;
-  out.planar_in = stats[Stage::PLANAR].in;
-  out.planar_out = stats[Stage::PLANAR].out;
-  out.elementary_in = stats[Stage::ELEMENTARY].in;
-  out.elementary_out = stats[Stage::ELEMENTARY].out;
-  out.record_ms = stats[Stage::RECORD].ms;
-  out.bounds_ms = stats[Stage::BOUNDS].ms;
-  out.broad_phase_ms = stats[Stage::BROAD_PHASE].ms;
-  out.planar_ms = stats[Stage::PLANAR].ms;
-  out.elementary_ms = stats[Stage::ELEMENTARY].ms;
-  out.obstacle_ms = stats[Stage::OBSTACLE].ms;
-  out.sort_ms = stats[Stage::SORT].ms;
-#define DCCD_FILL_EFFECT(EFFECT, name)        \
-  out.name##_in = stats[Effect::EFFECT].in;   \
-  out.name##_out = stats[Effect::EFFECT].out; \
-  out.name##_ms = stats[Effect::EFFECT].ms;
-  DCCD_EFFECTS(DCCD_FILL_EFFECT)
-#undef DCCD_FILL_EFFECT
+  auto row = out.stages.begin();
+  const auto add = [&row](const char* name, const StageStats& one) {
+    row->name = name;
+    row->count_in = one.in;
+    row->count_out = one.out;
+    row++->ms = one.ms;
+  };
+  constexpr std::size_t ROWS = std::tuple_size_v<decltype(stats.stages)> + std::tuple_size_v<decltype(stats.effects)>;
+  static_assert(StatsMessage::_stages_type::static_size + 1 == ROWS, "start_state is a stage and an effect");
+  for (std::size_t i = 0; i < stats.stages.size(); ++i) add(toString(static_cast<Stage>(i)), stats.stages[i]);
+  for (std::size_t i = 0; i < stats.effects.size(); ++i) {
+    const auto effect = static_cast<Effect>(i);
+    if (effect != Effect::START_STATE) add(toString(effect), stats.effects[i]);
+  }
   const auto tier = [&](Tier t) { return stats.tiers.settled[static_cast<std::size_t>(t)]; };
   out.tier_coincidence = tier(Tier::COINCIDENCE);
   out.tier_double_batch = tier(Tier::DOUBLE_BATCH);
@@ -291,10 +286,6 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
     out.map_age = mapAge(outcome);
   }
   out.excluded_voxels = outcome.excluded_voxels;
-  out.unknown_fraction = outcome.unknown_fraction;
-  out.look_ahead_compared = static_cast<std::uint32_t>(context.look_ahead.compared);
-  out.look_ahead_median_error = context.look_ahead.median_error_s;
-  out.look_ahead_p95_error = context.look_ahead.p95_error_s;
   out.maps_received = context.maps_received;
   out.maps_refused = context.maps_refused;
   out.markers_built = context.markers_built;

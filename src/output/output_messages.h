@@ -13,7 +13,6 @@
 #include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
-#include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "output/statement.h"
 #include "report/words.h"
@@ -65,7 +64,6 @@ struct StatsContext {
   std::uint64_t requests_refused = 0;    ///< of ~attach, ~detach and ~remove
   std::uint64_t wrong_row_steps = 0;     ///< clouds of which the data say it
   std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
-  LookAheadSummary look_ahead;
   std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;
   std::uint64_t promises = 0, promises_broken = 0;  ///< of ~safe_until, since the start

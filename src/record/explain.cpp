@@ -1,13 +1,17 @@
 #include "record/explain.h"
 
 #include <algorithm>
-#include <map>
+#include <limits>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 
+#include "dccd/accuracy.h"
 #include "obstacle/excluded_leaves.h"
+#include "obstacle/mesh_keys.h"
+#include "simd/float_mode.h"
+#include "simd/fused_filter.h"
 #include "step/history.h"
-#include "step/observer.h"
 #include "step/parts.h"
 
 namespace dccd {
@@ -100,75 +104,40 @@ const OccupiedLeaf* leafOf(const std::vector<OccupiedLeaf>& leaves, const VoxelK
   return found == leaves.end() ? nullptr : &*found;
 }
 
-/// What a step said of the pair, by part.
-class Watch : public StepObserver {
- public:
-  struct Seen {
-    bool streamed = false, planar_asked = true, past_planar = false, tested = false, reached_leaf = false;
-    std::string self_left_out;
-    PairSeparation separation;
-    ElementaryResult result;
-  };
-  Watch(PairKind kind, const std::vector<Feature>& features, const VoxelKey& leaf)
-      : kind_(kind), features_(features), leaf_(leaf) {}
-
-  std::map<std::size_t, Seen> parts;
-
-  void onPart(std::size_t part, const SceneArrays& scene) override {
-    scene_ = &scene;
-    seen_ = &parts[part];
-  }
-  void onSelfLeftOut(std::size_t body, const char* why) override {
-    if (features_.front().body == body && features_.back().body == body) seen_->self_left_out = why;
-  }
-  void onPairs(Stage stage, PairKind kind, const Quad* pairs, std::size_t count) override {
-    if (!contains(kind, pairs, count)) return;
-    (stage == Stage::BROAD_PHASE ? seen_->streamed : seen_->past_planar) = true;
-  }
-  void onPlanarSkipped(PairKind kind, const Quad* pairs, std::size_t count) override {
-    if (contains(kind, pairs, count)) seen_->planar_asked = false;
-  }
-  void onSeparation(PairKind kind, const Quad& pair, const PairSeparation& separation) override {
-    if (contains(kind, &pair, 1)) seen_->separation = separation;
-  }
-  void onResult(PairKind kind, const Quad& pair, const ElementaryResult& result) override {
-    if (!contains(kind, &pair, 1)) return;
-    seen_->tested = true;
-    seen_->result = result;
-  }
-  void onLeaf(const Index* vertices, std::size_t count, const OccupiedLeaf& leaf) override {
-    const std::vector<Index>& asked = features_[0].vertex;
-    if (leaf.min == leaf_ && std::is_permutation(asked.begin(), asked.end(), vertices, vertices + count)) {
-      seen_->reached_leaf = true;
-    }
-  }
-
- private:
-  bool isFeature(const Index* internal, const Feature& feature) const {
-    const SceneBody& body = scene_->bodies()[feature.body];
-    std::vector<Index> local;
-    for (std::size_t i = 0; i < feature.vertex.size(); ++i) {
-      const Index place = internal[i] - body.internal_begin;  // wraps around before the body's first
-      local.push_back(place < body.usedCount() ? body.slot_vertex[place] : NO_INDEX);
-    }
-    std::sort(local.begin(), local.end());
-    return local == feature.vertex;
-  }
-  bool contains(PairKind kind, const Quad* pairs, std::size_t count) const {
-    if (kind != kind_) return false;
-    const Feature &a = features_[0], &b = features_[1];
-    return std::any_of(pairs, pairs + count, [&](const Quad& q) {
-      return (isFeature(q.data(), a) && isFeature(q.data() + a.vertex.size(), b)) ||
-             (kind == PairKind::EDGE_EDGE && isFeature(q.data(), b) && isFeature(q.data() + 2, a));
-    });
-  }
-
-  PairKind kind_;
-  const std::vector<Feature>& features_;
-  const VoxelKey leaf_;
-  const SceneArrays* scene_ = nullptr;
-  Seen* seen_ = nullptr;
+/// A feature in the arrays of a scene.
+struct Place {
+  std::uint32_t slot;
+  const Index* vertices;  // internal
+  Index rank;
 };
+
+Place placeOf(const SceneArrays& scene, const Feature& feature) {
+  const SceneBody& body = scene.bodies()[feature.body];
+  const auto kind = static_cast<FeatureKind>(feature.vertex.size() - 1);
+  const ClusterTree& tree = body.tree(kind);
+  for (std::uint32_t slot = 0;; ++slot) {
+    const Index* internal = tree.feature(slot);
+    const auto isOf = [&](Index v) {
+      return std::binary_search(feature.vertex.begin(), feature.vertex.end(),
+                                body.slot_vertex[v - body.internal_begin]);
+    };
+    if (std::all_of(internal, internal + tree.arity(), isOf)) return {slot, internal, body.rank(kind)[slot]};
+  }
+}
+
+/// Whether the linear filter leaves the pair, of the trees that hold them.
+bool passesLinearFilter(const ClusterTree& a, std::uint32_t slot_a, const ClusterTree& b, std::uint32_t slot_b) {
+  constexpr std::uint32_t GROUP = simd::GROUP;
+  const std::uint32_t groups[2] = {slot_a / GROUP, slot_b / GROUP};
+  std::vector<std::uint32_t> kept(std::size_t{2} * GROUP * GROUP);
+  std::size_t consumed = 0;
+  kept.resize(2 * simd::testGroupPairs(a.level(0).view(), b.level(0).view(), groups, 1, false, simd::Diagonal::ALL,
+                                       false, kept.data(), kept.size() / 2, &consumed));
+  for (std::size_t i = 0; i < kept.size(); i += 2) {
+    if (kept[i] == slot_a && kept[i + 1] == slot_b) return true;
+  }
+  return false;
+}
 
 class Explanation {
  public:
@@ -233,10 +202,17 @@ class Explanation {
     return meetsItself(body(0)) ? "" : "self-collision of '" + body(0).name + "' is off";
   }
 
-  Outcome observe(const Step& step, const Options& options, Watch& watch) const {
-    History history;
-    history.impl().observer = &watch;
-    return detect(step, options, history);
+  /// f is given each straight part of the step.
+  template <class F>
+  void forEachPart(const F& f) {
+    Step part = step_;
+    if (parts_ > 1) {
+      for (Body& body : part.bodies) body.t1 = body.t0;
+    }
+    for (part_ = 0; part_ < parts_; ++part_) {
+      if (parts_ > 1) advance(step_, part_ + 1, parts_, part);
+      f(part);
+    }
   }
 
   void say(const std::string& stage, Says says, const std::string& text) {
@@ -256,41 +232,71 @@ class Explanation {
   const char* rung() const { return toString(options_.accuracy.rung); }
 
   void tellPair() {
-    Watch whole(kind_, features_, leaf_.min), single(kind_, features_, leaf_.min);
-    const bool cut = observe(step_, options_, whole).cut;
-    Step pair = alone(step_, features_);
-    pair.map = ObstacleMap();
-    Options all = options_;  // with nothing culled, so that every stage is asked
-    all.max_found = all.max_found_per_feature = 0;
-    all.broad_phase = BroadPhase::BRUTE_FORCE;
-    all.unfolded_test = false;
-    observe(pair, all, single);
-    for (part_ = 0; part_ < parts_; ++part_) tellPart(whole.parts[part_], single.parts[part_], cut);
+    const ScopedFloatMode mode;
+    History history;
+    history.impl().prepare(step_, options_);
+    forEachPart([&](const Step& part) { tellPart(part, history.impl()); });
   }
 
-  void tellPart(const Watch::Seen& seen, const Watch::Seen& single, bool cut) {
-    if (single.separation.left_out) {
+  /// Each filter, and the rung, is asked about the pair alone, whatever the one before said.
+  void tellPart(const Step& part, History::Impl& impl) {
+    SceneArrays& scene = impl.scene;
+    StepStats stats;
+    scene.record(part, stats);
+    scene.refit([](std::size_t n, const auto& f) { f(std::size_t{0}, n); }, stats);
+    std::size_t first = 0, second = 1;
+    std::array<Place, 2> place{placeOf(scene, features_[0]), placeOf(scene, features_[1])};
+    if (kind_ == PairKind::EDGE_EDGE && place[1].rank < place[0].rank) {
+      std::swap(place[0], place[1]);
+      std::swap(first, second);
+    }
+    const std::size_t a = features_[first].body, b = features_[second].body;
+    Quad quad;
+    std::copy_n(place[1].vertices, 4 - features_[first].vertex.size(),
+                std::copy_n(place[0].vertices, features_[first].vertex.size(), quad.begin()));
+
+    const double tolerance_m = holdsDistance(options_.accuracy.rung) ? options_.accuracy.tolerance_m : 0;
+    const SeparationRule rule(scene, a, b, tolerance_m);
+    const std::uint64_t key = std::uint64_t{place[0].rank} << 32 | place[1].rank;
+    const double apart_m =
+        a == b ? impl.prepared.left_out.of_body[a].distance(kind_, key) : std::numeric_limits<double>::infinity();
+    const PairSeparation separation = rule.of(kind_, quad, apart_m);
+    if (separation.left_out) {
       say("separation", Says::KEPT, "closer than the separation in the reference frame: left out of it");
     } else {
-      saySeparation(single.separation.total_m, single.separation.noise_m);
+      saySeparation(separation.total_m, separation.noise_m);
     }
-    if (!seen.self_left_out.empty()) {
-      say("self", Says::REJECTED, seen.self_left_out);
-    } else if (seen.streamed) {
-      say("broad phase", Says::KEPT, "");
-    } else if (cut) {
-      say("broad phase", Says::UNDECIDED, "not known: the step was cut at the limit of what it may find");
-    } else {
-      say("broad phase", Says::REJECTED, "bounds of the pair, of clusters around it, or of the bodies stay apart");
+    if (a == b && mayBeUnfolded(options_, scene, a)) {
+      Unfolded surface(scene.bodies()[a]);
+      surface.run(scene.bodies()[a], scene.vertices());
+      if (surface.isCertified()) {
+        say("self", Says::REJECTED, "the whole surface certainly does not fold onto itself in this step");
+      }
     }
-    if (!single.planar_asked) {
+    const bool near = passesLinearFilter(scene.bodies()[a].tree(firstKind(kind_)), place[0].slot,
+                                         scene.bodies()[b].tree(secondKind(kind_)), place[1].slot);
+    say("broad phase", near ? Says::KEPT : Says::REJECTED, near ? "" : "bounds of the pair stay apart");
+    if (rule.applies()) {  // to be apart is less than a distance
       say("planar", Says::KEPT, "not asked about a distance");
     } else {
-      say("planar", single.past_planar ? Says::KEPT : Says::REJECTED,
-          single.past_planar ? "" : "apart in a plane, or never in one plane");
+      std::uint32_t kept = 0;
+      const bool passes = simd::fusedFilter(scene.vertices()->t0, quad.data(), 1, kind_ == PairKind::EDGE_EDGE,
+                                            simd::FusedPlanes::ADAPTIVE, &kept) > 0;
+      say("planar", passes ? Says::KEPT : Says::REJECTED, passes ? "" : "apart in a plane, or never in one plane");
     }
-    if (!single.tested) return say(rung(), Says::REJECTED, "not asked: the planar filter rejects the pair");
-    const ElementaryResult& result = single.result;
+    tellRung(impl, quad, rule.applies() ? &separation.total_m : nullptr);
+  }
+
+  void tellRung(const History::Impl& impl, const Quad& quad, const double* separation_m) {
+    PairBatch batch;
+    batch.kind = kind_;
+    batch.vertices = impl.scene.vertices();
+    batch.pairs = &quad;
+    batch.count = 1;
+    batch.minimum_separation_m = separation_m;
+    ElementaryResult result;
+    TierCounters tiers;
+    impl.prepared.elementary->run(batch, &result, tiers);
     const std::string settled = std::string("settled by ") + toString(result.tier);
     if (result.verdict == Verdict::NO_CONTACT) return say(rung(), Says::REJECTED, settled);
     say(rung(), result.verdict == Verdict::CONTACT ? Says::CONTACT : Says::UNDECIDED,
@@ -302,27 +308,30 @@ class Explanation {
     for (const Index v : features_[0].vertex) {
       noise_m = std::max(noise_m, body(0).radius_m ? (*body(0).radius_m)[v] : 0);
     }
-    saySeparation(separationFromMap(body(0)) + noise_m, noise_m);
-    Options all = options_;
-    all.max_found = all.max_found_per_feature = 0;
+    const double separation_m = separationFromMap(body(0)) + noise_m;
+    saySeparation(separation_m, noise_m);
     Step feature = alone(step_, features_);
     for (Body& body : feature.bodies) body.self_collision = body.against_bodies = false;
-    Watch watch(kind_, features_, leaf_.min), unused(kind_, features_, leaf_.min);
-    const std::vector<Contact> found = observe(feature, all, watch).contacts;
+    const auto contactIn = [&](const Outcome& outcome) -> std::optional<Contact> {
+      for (const Contact& c : outcome.contacts) {
+        if (c.kind == kind_ && c.voxel == leaf_.min) return c;
+      }
+      return std::nullopt;
+    };
+    Options all = options_;
+    all.max_found = all.max_found_per_feature = 0;
+    History history, with_leaf_alone;
+    const std::optional<Contact> contact = contactIn(detect(feature, all, history));
     feature.map.surface = VoxelSurface::build(step_.map.surface->resolution(), {leaf_});
-    const std::vector<Contact> of_leaf_alone = observe(feature, all, unused).contacts;
-    const auto is = [&](const Contact& c) { return c.kind == kind_ && c.voxel == leaf_.min; };
-    const auto contact = std::find_if(found.begin(), found.end(), is);
-    const bool covered = std::any_of(of_leaf_alone.begin(), of_leaf_alone.end(), is);
+    const bool covered = contactIn(detect(feature, all, with_leaf_alone)).has_value();
     // Contacts are of the whole step: each is told in the part that it begins in.
-    const double along = contact == found.end() ? 0 : contact->toc_lower * static_cast<double>(parts_);
+    const double along = contact ? contact->toc_lower * static_cast<double>(parts_) : 0;
     const std::size_t part_of_contact = std::min(static_cast<std::size_t>(along), parts_ - 1);
-    for (part_ = 0; part_ < parts_; ++part_) {
-      const bool reached = watch.parts[part_].reached_leaf;
-      say("bounds", reached ? Says::KEPT : Says::REJECTED,
-          reached ? "" : "they stay off the leaf, or off all of it that this feature could be the first to meet");
-      if (part_ != part_of_contact) continue;
-      if (contact == found.end()) {
+    forEachPart([&](const Step& part) {
+      const bool near = reachesLeaf(part, separation_m * (1 + tolerance::SEPARATION_SUM));
+      say("bounds", near ? Says::KEPT : Says::REJECTED, near ? "" : "they stay off the leaf");
+      if (part_ != part_of_contact) return;
+      if (!contact) {
         say(rung(), Says::REJECTED, covered ? "a neighbour covers the leaf where it would be met" : "");
       } else {
         say(rung(), contact->certainty == Certainty::CERTAIN ? Says::CONTACT : Says::UNDECIDED,
@@ -330,7 +339,31 @@ class Explanation {
                 (contact->initial ? ", touching when the step begins" : "") +
                 (contact->leaving ? ", from within" : ""));
       }
+    });
+  }
+
+  bool reachesLeaf(const Step& part, double reach_m) const {
+    const Body& moving = part.bodies[features_[0].body];
+    const double inverse_resolution = 1 / step_.map.surface->resolution();
+    std::optional<KeyLanes> keys;
+    for (const auto* positions : {moving.t0.get(), moving.t1.get()}) {
+      Positions moved;
+      const Positions& in_map = inMapFrame(part.map.map_from_fixed, *positions, moved);
+      for (const Index v : features_[0].vertex) {
+        const KeyLanes of_vertex = pointKeys(in_map[v], inverse_resolution, reach_m);
+        if (keys) {
+          keys->include(of_vertex);
+        } else {
+          keys = of_vertex;
+        }
+      }
     }
+    const KeyBox box = keys->box();
+    const std::array<std::uint16_t, 3> low{leaf_.min.x, leaf_.min.y, leaf_.min.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (box.hi[axis] < low[axis] || box.lo[axis] >= low[axis] + static_cast<int>(leaf_.size)) return false;
+    }
+    return true;
   }
 
   const Step& step_;

@@ -1,5 +1,4 @@
-// Why is a pair a contact, or why not? The step once more, with an observer that watches the pair. For people; not a
-// fast path.
+// Why is a pair a contact, or why not? The one pair is asked again, filter by filter. For people; not a fast path.
 #pragma once
 
 #include <array>
@@ -29,9 +28,9 @@ struct TraceLine {
 };
 DCCD_EXPORT const char* toString(TraceLine::Says says);
 
-/// Up to the planar filter the step is asked as it is. That and the rung are asked about the pair alone, whatever came
-/// before: they confirm what was rejected.
-/// Throws std::invalid_argument when bodies, vertices, features or a map that the question names do not exist.
+/// Each filter, and the rung, is asked about the pair alone, whatever the one before said: the later ones confirm what
+/// was rejected. Throws std::invalid_argument when bodies, vertices, features or a map that the question names do not
+/// exist.
 DCCD_EXPORT std::vector<TraceLine> explain(const Step& step, const Options& options, const PairQuestion& question);
 
 }  // namespace dccd

@@ -1,5 +1,6 @@
 #include "record/flight_recorder.h"
 
+#include <atomic>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -36,23 +37,12 @@ std::string surpriseIn(const Outcome& outcome, const Options& options) {
   return {};
 }
 
-FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image, std::string owner,
-                               std::size_t max_map_bytes)
-    : ring_(steps),
-      max_map_bytes_(max_map_bytes),
-      folder_(std::move(folder)),
-      owner_(std::move(owner)),
-      newest_image_(newest_image) {
+FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, std::string owner, std::size_t max_map_bytes)
+    : ring_(steps), max_map_bytes_(max_map_bytes), folder_(std::move(folder)), owner_(std::move(owner)) {
   if (steps == 0) throw std::invalid_argument("a flight recorder keeps at least 1 step");
 }
 
-FlightRecorder::~FlightRecorder() {
-  const RecordingImage* mine = &image_;
-  if (newest_image_) newest_image_->compare_exchange_strong(mine, nullptr);
-}
-
 void FlightRecorder::onStep(const Step& step, const Options& options) {
-  if (newest_image_) *newest_image_ = nullptr;
   next_ = (next_ + 1) % ring_.size();
   count_ = std::min(count_ + 1, ring_.size());
   newest().step = step;
@@ -60,10 +50,6 @@ void FlightRecorder::onStep(const Step& step, const Options& options) {
   newest().has_answer = false;
   newest().answer = Outcome();
   forgetOldMaps();
-  if (!newest_image_) return;
-  newest().note = "written by the crash handler";
-  image_.build(newest());
-  *newest_image_ = &image_;
 }
 
 void FlightRecorder::forgetOldMaps() {
@@ -81,7 +67,7 @@ void FlightRecorder::forgetOldMaps() {
 
 void FlightRecorder::onOutcome(const Outcome& outcome) {
   if (count_ == 0) return;
-  newest().answer = outcome;  // the image points to nothing of the answer
+  newest().answer = outcome;
   newest().has_answer = true;
   const std::string surprise = surpriseIn(outcome, newest().options);
   if (surprise.empty()) return;

@@ -1,8 +1,7 @@
-// The last steps of a monitor, kept so that they can be written when somebody asks, when an answer contradicts what was
-// promised, or when the program crashes (node/crash_handler.h).
+// The last steps of a monitor, kept so that they can be written when somebody asks, or when an answer contradicts what
+// was promised.
 #pragma once
 
-#include <atomic>
 #include <limits>
 #include <string>
 #include <vector>
@@ -24,17 +23,11 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
  public:
   static constexpr std::size_t MAX_SURPRISES = 16;  ///< files of surprises per recorder, so that no disk is filled
 
-  /// Where a crash handler finds the step that is being computed; null: none.
-  using NewestImage = std::atomic<const RecordingImage*>;
-
-  /// steps >= 1. The folder is created when a file is written. newest_image: kept up to date, must outlive this.
-  /// `owner`: a part of each file's name, for a folder that several share. max_map_bytes: steps are forgotten whose
-  /// maps, other than the newest step's, take more than this together.
-  FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image = nullptr, std::string owner = {},
+  /// steps >= 1. The folder is created when a file is written. `owner`: a part of each file's name, for a folder that
+  /// several share. max_map_bytes: steps are forgotten whose maps, other than the newest step's, take more than this
+  /// together.
+  FlightRecorder(std::size_t steps, std::string folder, std::string owner = {},
                  std::size_t max_map_bytes = std::numeric_limits<std::size_t>::max());
-  ~FlightRecorder() override;
-  FlightRecorder(const FlightRecorder&) = delete;
-  FlightRecorder& operator=(const FlightRecorder&) = delete;
 
   void onStep(const Step& step, const Options& options) override;
   void onOutcome(const Outcome& outcome) override;
@@ -60,8 +53,6 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
   std::size_t next_ = 0, count_ = 0, surprises_ = 0;
   const std::size_t max_map_bytes_;
   std::string folder_, owner_, surprise_;
-  NewestImage* newest_image_;
-  RecordingImage image_;  // of the newest step without its answer, for the crash handler
 };
 
 }  // namespace dccd

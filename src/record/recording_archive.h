@@ -1,4 +1,4 @@
-// The two directions of a recording's bytes: fields into an image, and fields out of bytes. Which fields, and in what
+// The two directions of a recording's bytes: fields into bytes, and bytes into fields. Which fields, and in what
 // order, is said once for both in step_recording.cpp.
 #pragma once
 
@@ -26,16 +26,22 @@ inline constexpr std::size_t MAX_RECORDED_TEXT = 1 << 16;
 static_assert(sizeof(Vec3) == 24 && sizeof(Face) == 12 && sizeof(Index) == 4, "arrays are written as they are");
 static_assert(sizeof(Box) == 48, "arrays are written as they are");
 
-/// Appends fields to an image: small ones are copied, arrays are pointed at.
+/// A leaf without the gap that its structure has in memory.
+struct PackedLeaf {
+  std::uint16_t x, y, z, zero;
+  std::uint32_t size;
+};
+
+/// Hands over fields as bytes.
 class RecordingWriter {
  public:
   static constexpr bool READS = false;
-  explicit RecordingWriter(RecordingImage& image) : image_(image) {}
+  explicit RecordingWriter(const TakeBytes& take) : take_(take) {}
 
   template <typename T>
   void number(const T& value) {
     static_assert(std::is_arithmetic_v<T>);
-    copy(&value, sizeof value);
+    take_(&value, sizeof value);
   }
   void size(std::size_t value) { number(static_cast<std::uint64_t>(value)); }
   void flag(bool value) { number(static_cast<std::uint8_t>(value)); }
@@ -46,12 +52,12 @@ class RecordingWriter {
   void text(const std::string& value) {
     const std::uint32_t size = static_cast<std::uint32_t>(std::min(value.size(), MAX_RECORDED_TEXT));
     number(size);
-    copy(value.data(), size);
+    take_(value.data(), size);
   }
   template <typename T>
   void array(const std::vector<T>& values) {
     number(static_cast<std::uint64_t>(values.size()));
-    if (!values.empty()) image_.pieces_.push_back({values.data(), 0, values.size() * sizeof(T)});
+    take_(values.data(), values.size() * sizeof(T));
   }
   template <typename T>
   void shared(const std::shared_ptr<const std::vector<T>>& values) {
@@ -64,43 +70,19 @@ class RecordingWriter {
     number(static_cast<std::uint64_t>(values.size()));
   }
 
-  std::vector<std::uint8_t> bytes() const {
-    std::vector<std::uint8_t> all;
-    for (const auto& piece : image_.pieces_) {
-      const auto* begin =
-          piece.data ? static_cast<const std::uint8_t*>(piece.data) : image_.heads_.data() + piece.offset;
-      all.insert(all.end(), begin, begin + piece.size);
-    }
-    return all;
-  }
-
   void map(const std::shared_ptr<const VoxelSurface>& surface) {
     flag(surface != nullptr);
     if (!surface) return;
     number(surface->resolution());
-    if (image_.surface_ != surface) {
-      image_.leaves_.clear();
-      for (const OccupiedLeaf& leaf : surface->leaves()) {
-        image_.leaves_.push_back({leaf.min.x, leaf.min.y, leaf.min.z, 0, leaf.size});
-      }
-      image_.surface_ = surface;
+    std::vector<PackedLeaf> packed;
+    for (const OccupiedLeaf& leaf : surface->leaves()) {
+      packed.push_back({leaf.min.x, leaf.min.y, leaf.min.z, 0, leaf.size});
     }
-    array(image_.leaves_);
+    array(packed);
   }
 
  private:
-  void copy(const void* data, std::size_t size) {
-    if (size == 0) return;
-    const std::size_t offset = image_.heads_.size();
-    const std::uint8_t* bytes = static_cast<const std::uint8_t*>(data);
-    image_.heads_.insert(image_.heads_.end(), bytes, bytes + size);
-    if (!image_.pieces_.empty() && !image_.pieces_.back().data) {
-      image_.pieces_.back().size += size;
-    } else {
-      image_.pieces_.push_back({nullptr, offset, size});
-    }
-  }
-  RecordingImage& image_;
+  const TakeBytes& take_;
 };
 
 /// Takes fields from bytes that anybody may have written.
@@ -169,7 +151,7 @@ class RecordingReader {
     flag(present);
     if (!present) return;
     double resolution_m = 0;
-    std::vector<RecordingImage::PackedLeaf> packed;
+    std::vector<PackedLeaf> packed;
     number(resolution_m);
     array(packed);
     std::vector<OccupiedLeaf> leaves;

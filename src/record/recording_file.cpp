@@ -22,27 +22,6 @@ std::string systemText(const std::string& path) { return path + ": cannot be wri
 
 }  // namespace
 
-bool RecordingImage::write(int descriptor) const noexcept {
-  for (const Piece& piece : pieces_) {
-    const char* data = static_cast<const char*>(piece.data ? piece.data : heads_.data() + piece.offset);
-    std::size_t left = piece.size;
-    while (left > 0) {
-      const ssize_t written = ::write(descriptor, data, left);
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) return false;
-      data += written;
-      left -= static_cast<std::size_t>(written);
-    }
-  }
-  return true;
-}
-
-std::size_t RecordingImage::bytes() const {
-  std::size_t sum = 0;
-  for (const Piece& piece : pieces_) sum += piece.size;
-  return sum;
-}
-
 std::string writeNewRecording(const std::string& stem, const StepRecording& recording) {
   for (int copy = 1; copy <= MAX_COPIES; ++copy) {
     const std::string path = stem + (copy == 1 ? "" : "_" + std::to_string(copy)) + ".step";
@@ -63,23 +42,17 @@ std::string writeNewRecording(const std::string& stem, const StepRecording& reco
 }
 
 void writeRecording(const std::string& path, const StepRecording& recording) {
-  RecordingImage image;
-  image.build(recording);
   const std::string part = path + ".part";
-  const int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (descriptor < 0) throw std::runtime_error(systemText(path));
-  bool good = image.write(descriptor);
-  int why = errno;
+  std::FILE* file = std::fopen(part.c_str(), "wbe");
+  if (!file) throw std::runtime_error(systemText(path));
+  int why = 0;
+  serialise(recording, [&](const void* data, std::size_t size) {
+    if (why == 0 && size > 0 && std::fwrite(data, size, 1, file) != 1) why = errno;
+  });
   // A full disk may show up only here.
-  if (::close(descriptor) != 0 && good) {
-    good = false;
-    why = errno;
-  }
-  if (good && std::rename(part.c_str(), path.c_str()) != 0) {
-    good = false;
-    why = errno;
-  }
-  if (good) return;
+  if (std::fclose(file) != 0 && why == 0) why = errno;
+  if (why == 0 && std::rename(part.c_str(), path.c_str()) != 0) why = errno;
+  if (why == 0) return;
   ::unlink(part.c_str());
   errno = why;
   throw std::runtime_error(systemText(path));

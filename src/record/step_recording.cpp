@@ -277,29 +277,33 @@ void visit(Archive& a, Recording& r) {
   visitAnswer(a, r.answer);
 }
 
+template <typename Visit>
+std::vector<std::uint8_t> bytesOf(const Visit& visit) {
+  std::vector<std::uint8_t> all;
+  const TakeBytes append = [&](const void* data, std::size_t size) {
+    const auto* bytes = static_cast<const std::uint8_t*>(data);
+    all.insert(all.end(), bytes, bytes + size);
+  };
+  RecordingWriter writer(append);
+  visit(writer);
+  return all;
+}
+
 }  // namespace
 
-void RecordingImage::build(const StepRecording& recording) {
-  heads_.clear();
-  pieces_.clear();
-  RecordingWriter writer(*this);
+void serialise(const StepRecording& recording, const TakeBytes& take) {
+  RecordingWriter writer(take);
   for (const char c : MAGIC) writer.number(c);
   writer.number(RECORDING_VERSION);
   visit(writer, recording);
 }
 
 std::vector<std::uint8_t> recordedBytes(const Contact& contact) {
-  RecordingImage image;
-  RecordingWriter writer(image);
-  visitContact(writer, contact);
-  return writer.bytes();
+  return bytesOf([&](RecordingWriter& writer) { visitContact(writer, contact); });
 }
 
 std::vector<std::uint8_t> recordedBytes(const Outcome& answer) {
-  RecordingImage image;
-  RecordingWriter writer(image);
-  visitAnswer(writer, answer);
-  return writer.bytes();
+  return bytesOf([&](RecordingWriter& writer) { visitAnswer(writer, answer); });
 }
 
 StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {

@@ -2,11 +2,12 @@
 //
 // Little-endian; no alignment. "DCCDSTEP", u32 version, then the fields of StepRecording in the order of visit() in
 // step_recording.cpp. Counts are u64 (of texts u32), enumerations and flags u8; arrays of positions and faces are
-// the bytes that they have in memory, so that a crash handler can write them from where they lie.
+// the bytes that they have in memory.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -28,38 +29,15 @@ struct StepRecording {
   std::string note;  ///< why it was written, by what
   Step step;
   Options options;
-  bool has_answer = false;  ///< false: the program ended in the step
+  bool has_answer = false;  ///< false: the step has not been answered
   /// The file has contacts, start state, patches and what they are judged by. Not: times, the tables of what it cost,
   /// counts that follow from the contacts.
   Outcome answer;
 };
 
-/// A recording as the pieces of memory that its file consists of; large arrays stay where they are in the recording.
-class DCCD_EXPORT RecordingImage {
- public:
-  /// Valid until the recording changes.
-  void build(const StepRecording& recording);
-  /// Async-signal-safe. False with errno when the descriptor does not take all of it.
-  bool write(int descriptor) const noexcept;
-  std::size_t bytes() const;
-
- private:
-  friend class RecordingWriter;
-  friend class RecordingReader;
-  struct Piece {
-    const void* data = nullptr;  // null: `offset` into heads_
-    std::size_t offset = 0, size = 0;
-  };
-  /// A leaf without the gap that its structure has in memory.
-  struct PackedLeaf {
-    std::uint16_t x, y, z, zero;
-    std::uint32_t size;
-  };
-  std::vector<std::uint8_t> heads_;
-  std::vector<Piece> pieces_;
-  std::shared_ptr<const VoxelSurface> surface_;  // packed once for all steps with this map
-  std::vector<PackedLeaf> leaves_;
-};
+/// Hands over the bytes of the recording's file, one after another.
+using TakeBytes = std::function<void(const void* data, std::size_t size)>;
+DCCD_EXPORT void serialise(const StepRecording& recording, const TakeBytes& take);
 
 /// Writes into a file beside it first, so that a file of this name is whole. Throws std::runtime_error naming the file
 /// and the system's reason (disk full, no permission); nothing is left behind then.

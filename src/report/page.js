@@ -183,10 +183,9 @@ const longest = list => Math.max(1e-12, ...list);
 document.getElementById('effects_note').textContent =
   `Each pair and each moment counts in one row alone: a pair that carries a distance in tracker_noise or else minimum_separation, no longer in self_collision, body_body or octomap. Bounds of bodies: ${R.step_counters.bodies_refitted} times computed, ${R.step_counters.bodies_kept} times kept from the step before.` +
   (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +
-    `they came up ${R.step_counters.left_out_met} times.` : '') +
-  (R.unknown_fraction.max ? ` Of the swept space the map does not know ${number(100 * R.unknown_fraction.median)} % (median), at most ${number(100 * R.unknown_fraction.max)} %.` : '');
-{ const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
-  [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);
+    `they came up ${R.step_counters.left_out_met} times.` : '');
+{ const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'came true', 'not observed', 'not predicted'],
+  [[l.horizon_s, l.came_true, l.not_observed, l.not_predicted]]);
   else document.getElementById('look_ahead_part').remove(); }
 if (!R.study) document.getElementById('study_part').remove();
 else { const rows = R.study.rows, percent = v => `${(100 * v).toFixed(v < 0.0995 ? 1 : 0)} %`;

@@ -1,7 +1,6 @@
 #include "report/report.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <iomanip>
 #include <limits>
@@ -193,7 +192,6 @@ void Report::addTimes(const Outcome& o) {
   }
   timing_ << '\n';
   sum_ += o.stats;
-  if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
   total_ms_.push_back(o.stats.total_ms);
 }
 

@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 
 #include "dccd/effect_plan.h"
-#include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "report/clearance_table.h"
 #include "report/lanes.h"
+#include "report/look_ahead_score.h"
 #include "report/player_data.h"
 
 namespace dccd {
@@ -91,7 +91,6 @@ class Report {
   std::array<std::vector<double>, static_cast<std::size_t>(Stage::COUNT)> stage_ms_;
   StepStats sum_;
   std::vector<double> total_ms_;
-  std::vector<double> unknown_fraction_;
   std::size_t left_out_ = 0;
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;

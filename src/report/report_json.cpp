@@ -116,12 +116,9 @@ nlohmann::json Report::effectsJson() const {
 nlohmann::json Report::lookAheadJson() const {
   if (!look_ahead_) return {};
   return {{"horizon_s", horizon_s_},
-          {"compared", look_ahead_->compared},
+          {"came_true", look_ahead_->came_true},
           {"not_observed", look_ahead_->not_observed},
-          {"not_predicted", look_ahead_->not_predicted},
-          {"median_error_s", look_ahead_->median_error_s},
-          {"p95_error_s", look_ahead_->p95_error_s},
-          {"median_signed_error_s", look_ahead_->median_signed_error_s}};
+          {"not_predicted", look_ahead_->not_predicted}};
 }
 
 nlohmann::json Report::json() const {
@@ -156,7 +153,6 @@ nlohmann::json Report::json() const {
   j["effects"] = effectsJson();
   for (const StepCounter& counter : STEP_COUNTERS) j["step_counters"][counter.name] = sum_.*counter.value;
   j["left_out"] = {{"pairs", left_out_}};
-  j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
   j["study"] = study_;
   j["partners"] = lanes_.json();

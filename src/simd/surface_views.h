@@ -1,5 +1,5 @@
-// How parts of a surface are seen during a step, along directions to which some of the records' directions are
-// orthogonal (culling/unfolded_parts.h).
+// How a surface is seen during a step, along directions to which some of the records' directions are orthogonal
+// (culling/unfolded.h).
 #pragma once
 
 #include <cstddef>

@@ -9,7 +9,6 @@
 #include "step/clearance/clearance_finder.h"
 #include "step/conclude.h"
 #include "step/history.h"
-#include "step/observer.h"
 #include "step/parts.h"
 #include "step/start/start.h"
 
@@ -65,7 +64,6 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
     bool done = false;
     ~Guard() {
       if (!done) history.forgetPrepared();
-      history.begins_at = nullptr;
     }
   } guard{*this};
   const Clock::time_point called = Clock::now();
@@ -167,8 +165,7 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
   const Options& options = *prepared.options;
   std::size_t found_limit = foundLimit(options, scene.bodies());
   if (found_limit != FoundLimit::NONE) found_limit -= std::min(found_limit, outcome.contacts.size());
-  const Part part{step,     index, count,       continues, deadline,  Clock::now(),
-                  prepared, scene, found_limit, per_hit_,  begins_at, observer};
+  const Part part{step, index, count, continues, deadline, Clock::now(), prepared, scene, found_limit, per_hit_};
   Findings result;
   pairs.begin();
   if (!fill(part, result.stats)) {
@@ -199,11 +196,10 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
 /// The part's positions into the scene's arrays, and what of it needs bounds. False: there was no time for these.
 bool History::Impl::fill(const Part& part, StepStats& stats) {
   Clock::time_point start = Clock::now();
-  scene.record(part.step, stats, prepared.threads, !observer && !part.options().clearance.wanted);
+  scene.record(part.step, stats, prepared.threads, !part.options().clearance.wanted);
   for (std::size_t b = 0; b < carried.map.size(); ++b) {
     if (!scene.bodies()[b].unchanged) carried.map[b] = MapAnswer();
   }
-  if (observer) observer->onPart(part.index, scene);
   if (scene.uncertain()) checkHoldsDistance(part.options(), "an uncertainty radius");
   stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
   start = Clock::now();
@@ -227,7 +223,7 @@ bool History::Impl::fill(const Part& part, StepStats& stats) {
   // A single body that does not meet itself is tested against the map alone, which has bounds of its own.
   const bool any = std::find(bounded_.begin(), bounded_.end(), 1) != bounded_.end();
   std::vector<std::uint8_t> leaves_wait;
-  for (const Unfolded& surface : self_tests.unfolded()) leaves_wait.push_back(surface.holdsMost());
+  for (const Unfolded& surface : self_tests.unfolded()) leaves_wait.push_back(surface.isCertified());
   if (any || bounded_.size() > 1) scene.refit(inPieces, stats, bounded_, leaves_wait);
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;

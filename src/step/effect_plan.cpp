@@ -120,7 +120,7 @@ Finding rigidBodies(const EffectScene& scene) {
 }
 
 Finding unknownSpace(const EffectScene& scene) {
-  if (!scene.unknown_space_counts) return impossible("unknown_space is free; set it to occupied or report");
+  if (!scene.unknown_space_counts) return impossible("unknown_space is free; set it to occupied");
   if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
   if (!scene.map_used) return idle("unknown_space is not free, but there is no map that could know it");
   return wanted("unknown_space is not free");
@@ -196,10 +196,7 @@ Finding lookAhead(const EffectScene& scene) {
   return wanted("predictions reach " + metres(scene.look_ahead_s) + " s ahead");
 }
 
-Finding patches(const EffectScene& scene) {
-  if (scene.earliest_only) return impossible("earliest_only is true, and patches are made of all contacts");
-  return wanted("contacts that belong together are told as one");
-}
+Finding patches(const EffectScene&) { return wanted("contacts that belong together are told as one"); }
 
 Finding ownVoxels(const EffectScene& scene) {
   std::string bodies;

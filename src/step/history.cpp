@@ -20,12 +20,8 @@ History::History() : impl_(std::make_unique<Impl>()) {}
 History::~History() = default;
 History::History(History&& other) noexcept = default;
 History& History::operator=(History&& other) noexcept = default;
-void History::clear() {
-  impl_->carried.clear();
-  impl_->begins_at = nullptr;
-}
-void History::beginAt(History& other) { impl_->begins_at = other.impl_.get(); }
-bool History::isClear() const { return impl_->carried.isClear() && !impl_->begins_at; }
+void History::clear() { impl_->carried.clear(); }
+bool History::isClear() const { return impl_->carried.isClear(); }
 const std::vector<LeftOutPair>& History::leftOut() const { return impl_->prepared.left_out.list; }
 
 void Carried::clear() {

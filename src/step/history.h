@@ -22,7 +22,6 @@
 namespace dccd {
 
 class ClearanceFinder;
-class StepObserver;
 
 /// Made from options, bodies and map, again when these change. No part of a step changes it.
 struct Prepared {
@@ -67,12 +66,9 @@ struct DCCD_HIDDEN Part {
   const SceneArrays& scene;          ///< once it is filled: the part's positions
   std::size_t found_limit;           ///< what may be found in it; FoundLimit::NONE: no limit
   std::chrono::nanoseconds per_hit;  ///< what a hit takes after the pairs, until it is in an outcome
-  History::Impl* begins_at;          ///< of a step aside: where it begins
-  StepObserver* observer;
 
   const Options& options() const { return *prepared.options; }
-  /// Of a step aside from all others only the first part is asked about: nothing is carried over from it.
-  bool checksStartState() const { return options().check_start_state && (index == 0 || !begins_at); }
+  bool checksStartState() const { return options().check_start_state; }
   /// For a stage that begins now: later parts need as much time for what was done before it; what is over is shared.
   Deadline shareFrom(Deadline::Clock::time_point now) const {
     if (deadline.isNever()) return deadline;
@@ -83,11 +79,11 @@ struct DCCD_HIDDEN Part {
 
 struct History::Impl {
   Outcome run(const Step& step, const Options& wanted, Deadline deadline);
+  /// What run() begins with.
+  void prepare(const Step& step, const Options& wanted);
 
   Prepared prepared;
   Carried carried;
-  StepObserver* observer = nullptr;
-  Impl* begins_at = nullptr;  // the next step begins where this one's ended
 
   // The stages of a part: what each keeps from step to step are buffers, and what it has learnt of the meshes.
   SceneArrays scene;  // the bodies are those that were prepared
@@ -99,7 +95,6 @@ struct History::Impl {
 
  private:
   void forgetPrepared() noexcept;
-  void prepare(const Step& step, const Options& wanted);
   void setOptions(const Options& wanted);
   void setBodies(const Step& step);
   bool runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome);

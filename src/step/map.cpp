@@ -6,7 +6,6 @@
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/history.h"
-#include "step/observer.h"
 
 namespace dccd {
 namespace {
@@ -125,7 +124,6 @@ bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>&
   ObstacleQuery query{*part.prepared.map.surface, *body.setup.topology, inMapFrame(map_from_fixed, *moving.t0, t0_),
                       inMapFrame(map_from_fixed, *moving.t1, t1_)};
   query.body = static_cast<std::uint16_t>(b);
-  query.observer = part.observer;
   if (body.masked) {
     active_.assign(body.setup.topology->vertexCount(), 0);
     for (std::size_t i = 0; i < body.usedCount(); ++i) active_[body.slot_vertex[i]] = body.active[i];

@@ -230,12 +230,6 @@ void Monitor::withdraw(std::size_t body) {
   m.forgetLast();
 }
 
-Deadline Monitor::restOf(const Outcome& outcome) const {
-  const double limit_ms = stepMs();
-  // A limit of 0 would be none.
-  return impl_->deadlineAfter(limit_ms > 0 ? std::max(1e-6, limit_ms - outcome.stats.total_ms) : 0);
-}
-
 void Monitor::cancel() { impl_->cancelled = true; }
 
 void Monitor::dropSteps(StepStatus status, const std::string& reason) { impl_->dropWaiting(status, reason); }

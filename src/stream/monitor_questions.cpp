@@ -76,7 +76,6 @@ Outcome Monitor::predict() {
     body.t1 = share(std::move(to));
   }
   m.side_history.clear();
-  m.side_history.beginAt(m.history);
   Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, deadline);
   if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
   return outcome;

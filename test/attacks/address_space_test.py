@@ -72,7 +72,7 @@ class AddressSpaceTest(AttackTest):
 
     def test_a_checkerboard(self):
         name = 'space_board'
-        self.start(name, **{'effects/octomap': 'on', 'octomap_topic': '/%s/map' % name, 'unknown_space': 'report'})
+        self.start(name, **{'effects/octomap': 'on', 'octomap_topic': '/%s/map' % name})
         maps = self.advertise('/%s/map' % name, Octomap)
         whole = Octomap(binary=True, id='OcTree', resolution=0.01)
         whole.header.frame_id = 'world'

@@ -63,7 +63,7 @@ class EndingTest(AttackTest):
         path = os.path.join(self.folder, 'board.bt')
         checkerboard_file(path, 7)
         node = subprocess.Popen([str(self.tool('collision_monitor_node')), '__name:=board', '_fixed_frame:=world',
-                                 '_octomap_file:=' + path, '_unknown_space:=report'])
+                                 '_octomap_file:=' + path])
         self.addCleanup(self.end, node)
         # Until then a signal is not the node's to answer.
         begun = time.monotonic()

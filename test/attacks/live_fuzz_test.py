@@ -45,7 +45,7 @@ class LiveFuzzTest(AttackTest):
                   'markers/mesh': r.choice(['true', 'false']), 'markers/obstacle_m': r.choice([0.0, 0.5]),
                   'fixed_frame': r.choice(['world', '']), 'transform_timeout_s': r.choice([0.0, 0.1]),
                   'step_budget_ms': r.choice([0.0, 0.0, 5.0]), 'max_compute_s': 0.2, 'uncertainty/radius_m': r.choice([0.0, 0.0, 0.001]),
-                  'unknown_space': r.choice(['free', 'free', 'report', 'occupied']), 'weld': r.choice(['on', 'off'])}
+                  'unknown_space': r.choice(['free', 'free', 'occupied']), 'weld': r.choice(['on', 'off'])}
         self.lists = {'unknown_box': [-1, -1, -1, 1, 1, 1]}
         if r.random() < 0.4:
             self.lists['exclude_boxes'] = [[-0.5, -0.5, -0.5, 0.5003, 0.5, 0.5]]

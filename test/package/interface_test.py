@@ -123,13 +123,16 @@ class InterfaceTest(unittest.TestCase):
         curves = [curve.get('name') for curve in ElementTree.parse(CHECKOUT / 'config/plotjuggler.xml').iter('curve')]
         self.assertGreater(len(curves), 10)
         for curve in curves:
-            _, node, topic, field = curve.split('/')
+            _, node, topic, field, *inner = curve.split('/')
             with self.subTest(curve):
                 self.assertEqual(node, 'collision_monitor')
                 if types[topic] == 'Bool':
                     self.assertEqual(field, 'data')
                 else:
                     message = (CHECKOUT / 'msg' / (types[topic] + '.msg')).read_text()
+                    if inner:  # of an item of an array
+                        kind, = re.findall(r'(?m)^(\w+)\[\d+\] %s\b' % field.split('[')[0], message)
+                        message, field = (CHECKOUT / 'msg' / (kind + '.msg')).read_text(), inner[0]
                     self.assertRegex(message, r'(?m)^(u?int|float)\d+ %s\b' % field)
 
     def test_services(self):

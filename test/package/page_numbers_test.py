@@ -43,7 +43,6 @@ NUMBERS = {
     'doc/interface.md': [
         (r'(\d+) steps wait at most', lambda: constant('include/dccd/stream.h', 'max_waiting')),
         (r'box around them, ([\d,]+) at most', lambda: constant('src/output/scene_markers.cpp', 'MAX_VOXELS_SHOWN')),
-        (r'be counted, (\d+) million voxels', lambda: constant('include/dccd/known_space.h', 'MOST_BLOCKS') * 64 / 10**6),
         (r'stops looking at (\d+) contacts a MB', lambda: MB / 4 / tolerance('BYTES_PER_CONTACT')),
         (r'and at (\d+) for each vertex, edge', lambda: tolerance('CONTACTS_PER_FEATURE')),
         (r'\((\d+) if a distance is held', lambda: tolerance('CONTACTS_PER_FEATURE_WITH_DISTANCE')),
@@ -58,9 +57,6 @@ NUMBERS = {
     ],
     'doc/mesh_files.md': [
         (r'Files over (\d+) MiB', lambda: constant('src/input/mesh_file.cpp', 'MAX_FILE_BYTES') / MB),
-    ],
-    'doc/performance.md': [
-        (r'`~stats` \(newest (\d+)\)', lambda: constant('include/dccd/look_ahead_score.h', 'LOOK_AHEAD_SAMPLES')),
     ],
     'doc/tools.md': [
         (r'at most (\d+) files a run', lambda: constant('src/record/flight_recorder.h', 'MAX_SURPRISES')),
@@ -86,9 +82,6 @@ NUMBERS = {
         (r'job may take ([\d,]+) MB', lambda: fleet('mem-mb')),
         (r'MB and (\d+) minutes', lambda: fleet('runtime')),
         (r'at most (\d+) run at once', lambda: fleet('jobs')),
-    ],
-    'msg/StepStats.msg': [
-        (r'\((\d+) blocks of 4\^3 voxels\)', lambda: constant('include/dccd/known_space.h', 'MOST_BLOCKS')),
     ],
 }
 

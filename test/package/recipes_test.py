@@ -48,7 +48,7 @@ EFFECT = {
     'include/dccd/detect.h': ('  bool patches = false;', '  bool toy = true;\n  bool patches = false;'),
     'src/step/option_rows.h': [('expected, patches, clearance, excluded]', 'expected, toy, patches, clearance, excluded]'),
                                ('recorded(patches)', 'recorded(toy), recorded(patches)')],
-    'msg/StepStats.msg': ('float64 patches_ms\n', 'float64 patches_ms\nuint64 toy_in\nuint64 toy_out\nfloat64 toy_ms\n'),
+    'msg/StepStats.msg': ('StageStats[19] stages', 'StageStats[20] stages'),
 }
 USER = r'''
 #include <dccd/accuracy.h>
@@ -146,18 +146,18 @@ class RecipesTest(unittest.TestCase):
             self.publish_toy(tree)
 
     def publish_toy(self, tree):
-        """The message with the toy's fields is generated, and what fills it compiles: it names the fields of each row."""
+        """The message with a row more is generated, and what fills it compiles: it demands a row of each effect."""
         headers = TOOLS.parents[1] / 'include'
         generator = shutil.which('gen_cpp.py') or '/usr/lib/gencpp/gen_cpp.py'
         if not (headers / 'deformable_ccd/StepStats.h').is_file() or not os.path.isfile(generator):
-            self.skipTest('the toy was built and seen; no messages are generated here, so that its fields were not')
+            self.skipTest('the toy was built and seen; no messages are generated here, so that its row was not')
         for command in ([sys.executable, generator, 'msg/StepStats.msg', '-p', 'deformable_ccd', '-o', 'made/deformable_ccd',
                          '-I', 'deformable_ccd:msg', '-I', 'std_msgs:/usr/share/std_msgs/msg', '-e', '/usr/share/gencpp'],
                         ['g++', '-std=c++17', '-fsyntax-only', '-Imade', '-Iinclude', '-Isrc', '-I' + str(headers),
                          '-isystem', '/usr/include/eigen3', 'src/output/output_messages.cpp']):
             ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
             self.assertEqual(ran.returncode, 0, ran.stdout[-3000:] + ran.stderr[-3000:])
-        self.assertIn('_toy_ms_type toy_ms;', (tree / 'made/deformable_ccd/StepStats.h').read_text())
+        self.assertRegex((tree / 'made/deformable_ccd/StepStats.h').read_text(), r'boost::array<.*StageStats.*, 20>')
 
 
 if __name__ == '__main__':

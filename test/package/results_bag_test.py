@@ -55,10 +55,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
         stats = messages[OWN + 'stats']
         self.assertEqual([s.markers_built for s in stats], list(range(1, frames + 1)))
         self.assertEqual({(s.maps_received, s.maps_refused) for s in stats}, {(1, 0)})
-        score = json.loads((self.folder / 'out/report.json').read_text())['look_ahead']
-        self.assertGreater(score['compared'], 0)
-        self.assertEqual(stats[-1].look_ahead_compared, min(score['compared'], 1000))
-        self.assertLess(stats[0].look_ahead_compared, stats[-1].look_ahead_compared)
+        self.assertGreater(json.loads((self.folder / 'out/report.json').read_text())['look_ahead']['came_true'], 0)
 
     def test_a_rope_is_drawn_as_a_tube_and_what_is_expected_apart(self):
         rope, params, out = self.folder / 'rope.bag', self.folder / 'rope.yaml', self.folder / 'rope_out.bag'

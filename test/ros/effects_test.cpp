@@ -80,6 +80,12 @@ struct Apart : MonitorTest {
     }
     return false;
   }
+  std::uint64_t clearancesAsked() {
+    for (const deformable_ccd::StageStats& row : stats.last().stages) {
+      if (row.name == "clearance") return row.count_in;
+    }
+    return 0;
+  }
   /// The state after a step between two heights above the map.
   deformable_ccd::State fall(double from_z, double to_z, double end_s) {
     map.publish(blockBelowZero(true));
@@ -107,7 +113,7 @@ deformable_ccd::Clearance withMap(const deformable_ccd::ClearanceArray& distance
 TEST_F(Apart, DistancesAreMeasuredWhileSomebodyListens) {
   EXPECT_FALSE(running());
   EXPECT_TRUE(std::isnan(fall(1, 0.75, 50).clearance_lower));
-  EXPECT_EQ(stats.last().clearance_in, 0u);
+  EXPECT_EQ(clearancesAsked(), 0u);
   {
     Probe<deformable_ccd::ClearanceArray> distances(node, "/apart/clearance");
     ASSERT_TRUE(waitUntil([&] { return running(); }));
@@ -123,7 +129,7 @@ TEST_F(Apart, DistancesAreMeasuredWhileSomebodyListens) {
     EXPECT_GE(pair.at_end.upper, 0.5);
     EXPECT_NEAR(pair.closing_speed, 1, 1e-6) << "0.25 m in 0.25 s";
     ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100); }));
-    EXPECT_GE(stats.last().clearance_in, 1u);
+    EXPECT_GE(clearancesAsked(), 1u);
   }
   EXPECT_TRUE(waitUntil([&] { return !running(); })) << "the subscriber has gone";
 }

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <cstdio>
 #include <stdexcept>
 
 namespace dccd {
@@ -119,16 +118,11 @@ StepRecording recordScene(const MonitorOptions& options, bool with_map, bool wit
 }
 
 std::vector<std::uint8_t> recordingBytes(const StepRecording& recording) {
-  RecordingImage image;
-  image.build(recording);
-  std::vector<std::uint8_t> bytes(image.bytes());
-  std::FILE* file = std::tmpfile();
-  if (!file) throw std::runtime_error("no temporary file");
-  const bool written = image.write(fileno(file));
-  std::rewind(file);
-  const std::size_t read = std::fread(bytes.data(), 1, bytes.size(), file);
-  std::fclose(file);
-  if (!written || read != bytes.size()) throw std::runtime_error("a temporary file took not all of a recording");
+  std::vector<std::uint8_t> bytes;
+  serialise(recording, [&](const void* data, std::size_t size) {
+    const auto* begin = static_cast<const std::uint8_t*>(data);
+    bytes.insert(bytes.end(), begin, begin + size);
+  });
   return bytes;
 }
 

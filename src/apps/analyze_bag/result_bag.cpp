@@ -15,8 +15,7 @@
 
 namespace dccd {
 
-ResultBag::ResultBag(const std::string& path, const MonitorConfig& config)
-    : bag_(path), look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES), diagnostics_(MONITOR_NAMESPACE) {}
+ResultBag::ResultBag(const std::string& path) : bag_(path), diagnostics_(MONITOR_NAMESPACE) {}
 
 template <class Message>
 void ResultBag::write(const char* name, const ros::Time& at, const Message& message) {
@@ -62,13 +61,8 @@ bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
   return true;
 }
 
-StatsContext ResultBag::contextOf(const Outcome& outcome, const MonitorPipeline& pipeline,
-                                  const BagReplaySummary& so_far) {
+StatsContext ResultBag::contextOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far) {
   StatsContext context = countersOf(pipeline, so_far);
-  if (pipeline.config().monitor.look_ahead_s > 0) {
-    look_ahead_.observe(outcome);
-    context.look_ahead = look_ahead_.summary();
-  }
   if (!pipeline.fixedFrame().empty()) ++markers_built_;  // before a frame was taken there is none to draw in
   context.markers_built = markers_built_;
   return context;
@@ -122,7 +116,7 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
                     const ros::Time& at) {
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  const StatsContext context = contextOf(outcome, pipeline, so_far);
+  const StatsContext context = contextOf(pipeline, so_far);
   write("contacts", at, toContactArray(outcome, bodies, frame));
   addPlan(outcome, pipeline, at);
   write("stats", at, toStepStats(outcome, context, frame));
@@ -142,7 +136,6 @@ void ResultBag::addPrediction(const Outcome& prediction, const MonitorPipeline& 
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   const double horizon_s = pipeline.config().monitor.look_ahead_s;
-  look_ahead_.predict(prediction);
   write("predicted_contacts", at, toContactArray(prediction, bodies, frame));
   write("time_to_contact", at, toTimeToContact(prediction, horizon_s, bodies, frame));
   if (!prediction.answered || frame.empty()) return;

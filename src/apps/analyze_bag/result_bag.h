@@ -5,7 +5,6 @@
 #include <string>
 
 #include "apps/output_bag.h"
-#include "dccd/look_ahead_score.h"
 #include "node/bag_replay.h"
 #include "output/diagnostics.h"
 
@@ -14,7 +13,7 @@ namespace dccd {
 class ResultBag {
  public:
   /// Throws rosbag::BagException when the file cannot be opened; the others as OutputBag.
-  ResultBag(const std::string& path, const MonitorConfig& config);
+  explicit ResultBag(const std::string& path);
   /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
   void copy(const rosbag::MessageInstance& m, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at);
@@ -25,14 +24,13 @@ class ResultBag {
   template <class Message>
   void write(const char* name, const ros::Time& at, const Message& message);
   bool copyOthersDiagnostics(const rosbag::MessageInstance& m);
-  StatsContext contextOf(const Outcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
+  StatsContext contextOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at);
   void addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
   void addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
   void addPromise(const Outcome& outcome, const MonitorPipeline& pipeline, bool proved, const ros::Time& at);
 
   OutputBag bag_;
-  LookAheadScore look_ahead_;
   std::uint64_t markers_built_ = 0;
   Diagnostics diagnostics_;
   std::string map_source_;  // where the octomap is looked for; empty when none is expected

@@ -190,7 +190,6 @@ AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, cons
   detector.accuracy = finest(config);
   detector.patches = true;
   detector.suppress_initial = false;
-  detector.earliest_only = false;
   whole.setting = nameOf(detector.accuracy);
   StudyRunner runner(bag, options);
   constexpr std::size_t ABOUT = 20;  // how many runs there are is known once the reference is

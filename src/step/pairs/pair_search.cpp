@@ -36,7 +36,7 @@ void keepShare(bool sample, std::vector<std::uint32_t>& pairs) {
 bool stopsAtFirst(const Part& part) {
   const Options& options = part.options();
   return options.earliest_only && options.accuracy.rung == Accuracy::EXACT &&
-         options.broad_phase == BroadPhase::CLUSTERED && !part.observer;
+         options.broad_phase == BroadPhase::CLUSTERED;
 }
 
 }  // namespace
@@ -57,8 +57,6 @@ void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays&
   context.earliest_only = options.earliest_only;
   context.bounds_late = options.earliest_only && !until_first;
   context.left_out = &part.prepared.left_out.of_body;
-  context.unfolded = &self_tests.unfolded();
-  context.observer = part.observer;
   context.deadline = part.deadline;
   context.per_hit = part.per_hit;
   if (holdsDistance(options.accuracy.rung)) context.tolerance_m = options.accuracy.tolerance_m;
@@ -91,8 +89,7 @@ void PairSearch::addTasks(const Search& search, PairKind kind, std::size_t a, st
   }
   const bool limited = search.found_limit != FoundLimit::NONE;
   const std::size_t room = limited ? tolerance::MAX_SUPERCLUSTER_PAIRS - group_pairs_.size() / 2 : FoundLimit::NONE;
-  const SearchRest rest =
-      superclusterPairs(trees, found_groups_, scratch_, room, context.deadline, &search.result.stats.unfolded_pairs);
+  const SearchRest rest = superclusterPairs(trees, found_groups_, scratch_, room, context.deadline);
   if (rest.toc <= 1) leaveOut(rest.toc, !rest.late, search.result);
   if (search.share != Share::ALL) keepShare(search.share == Share::SAMPLE, found_groups_);
   const auto ordering = ORDERING_A_PAIR * static_cast<std::int64_t>(found_groups_.size() / 2);

@@ -123,7 +123,6 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   }
   end();
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
-  stats_.unfolded_pairs += stream_.clusterPairsLeftOut();
   stream_.clearCounters();
 }
 
@@ -158,9 +157,6 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
   stats_[Stage::BROAD_PHASE].out += n - count_;
   stats_[effect()].in += n - count_;
-  if (context_->observer) {
-    context_->observer->onPairs(Stage::BROAD_PHASE, task_->kind, quads_.data() + count_, n - count_);
-  }
   count_ = n;
   if (count_ >= CHUNK) flush();
 }
@@ -194,10 +190,7 @@ void PairWorker::flush() {
 }
 
 void PairWorker::filter() {
-  if (separated_) {  // the planar filter proves "never touch", not "never closer than d"
-    if (context_->observer) context_->observer->onPlanarSkipped(task_->kind, quads_.data(), count_);
-    return;
-  }
+  if (separated_) return;  // the planar filter proves "never touch", not "never closer than d"
   stats_[Stage::PLANAR].in += count_;
   const std::size_t kept =
       simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_, task_->kind == PairKind::EDGE_EDGE,
@@ -211,7 +204,6 @@ void PairWorker::filter() {
   }
   count_ = kept;
   stats_[Stage::PLANAR].out += kept;
-  if (context_->observer) context_->observer->onPairs(Stage::PLANAR, task_->kind, quads_.data(), count_);
   lap(Stage::PLANAR);
 }
 
@@ -247,7 +239,6 @@ void PairWorker::setSeparations() {
     const double apart_m = left_out_ ? left_out_->distance(task_->kind, keys_[i]) : INFINITE;
     const PairSeparation pair = rule_.of(task_->kind, quads_[i], apart_m);
     separations_[i] = pair.total_m;
-    if (context_->observer) context_->observer->onSeparation(task_->kind, quads_[i], pair);
     stats_.left_out_met += pair.left_out;
     --stats_[effect()].in;
     ++stats_[effectOf(pair.total_m, pair.noise_m)].in;
@@ -321,7 +312,6 @@ void PairWorker::decide() {
   std::uint32_t* hit = kept_.data();
   for (std::size_t i = 0; i < count_; ++i) {
     const ElementaryResult& r = results_[i];
-    if (context_->observer) context_->observer->onResult(task_->kind, quads_[i], r);
     *hit = static_cast<std::uint32_t>(i);
     hit += (r.verdict != Verdict::NO_CONTACT) & !(r.toc_lower > context_->not_after);
   }

@@ -9,7 +9,6 @@
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
-#include "step/observer.h"
 #include "step/pairs/found_limit.h"
 #include "step/pairs/left_out.h"
 #include "step/pairs/pair_separation.h"
@@ -57,27 +56,20 @@ struct StepContext {
   Deadline deadline;
   std::atomic<bool> expired{false};
   bool earliest_only = false;
-  StepObserver* observer = nullptr;
   const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
-  double tolerance_m = 0;                           ///< the elementary test may call features this far apart a contact
-  std::atomic<double> best_toc_upper{2};            ///< earliest_only: contacts after this are not wanted
-  FoundLimit* found = nullptr;                      ///< null: no limit
-  const std::vector<Unfolded>* unfolded = nullptr;  ///< per body; null: nothing is known of them
-  double not_after = 2;                             ///< earliest_only: contacts that begin after this are not listed
-  bool bounds_late = false;  ///< earliest_only: a pair's TOC is bounded before its elementary test
-  Span span;                 ///< of the bounds
+  double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
+  std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
+  FoundLimit* found = nullptr;            ///< null: no limit
+  double not_after = 2;                   ///< earliest_only: contacts that begin after this are not listed
+  bool bounds_late = false;               ///< earliest_only: a pair's TOC is bounded before its elementary test
+  Span span;                              ///< of the bounds
   /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
   std::chrono::nanoseconds per_hit{0};
   std::atomic<std::size_t> hits{0};
   /// Of the pairs of two bodies, or of a body with itself.
   TreePair treesOf(PairKind kind, std::size_t a, std::size_t b) const {
-    TreePair trees{&scene->bodies()[a].tree(firstKind(kind)), &scene->bodies()[b].tree(secondKind(kind)),
-                   a == b && kind == PairKind::EDGE_EDGE, span, a == b};
-    if (a == b && unfolded) {
-      trees.parts_a = (*unfolded)[a].parts(firstKind(kind));
-      trees.parts_b = (*unfolded)[a].parts(secondKind(kind));
-    }
-    return trees;
+    return {&scene->bodies()[a].tree(firstKind(kind)), &scene->bodies()[b].tree(secondKind(kind)),
+            a == b && kind == PairKind::EDGE_EDGE, span, a == b};
   }
   Deadline pairsDeadline() const {
     return deadline.movedBy(-per_hit * static_cast<std::int64_t>(hits.load(std::memory_order_relaxed)));

@@ -3,7 +3,6 @@
 #include <functional>
 
 #include "step/history.h"
-#include "step/observer.h"
 
 namespace dccd {
 namespace {
@@ -15,14 +14,14 @@ bool staysApart(const Part& part, std::size_t b, const std::vector<std::uint8_t>
   return part.continues && b < apart.size() && apart[b] && body.translates && !body.uncertain;
 }
 
-bool mayBeUnfolded(const Part& part, std::size_t b) {
-  const SceneBody& body = part.scene.bodies()[b];
-  // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
-  if (!part.options().unfolded_test || part.options().broad_phase == BroadPhase::BRUTE_FORCE) return false;
-  return part.scene.separation(b, b) == 0 && !body.uncertain && !body.masked;
-}
-
 }  // namespace
+
+bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t b) {
+  const SceneBody& body = scene.bodies()[b];
+  // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
+  if (!options.unfolded_test || options.broad_phase == BroadPhase::BRUTE_FORCE) return false;
+  return scene.separation(b, b) == 0 && !body.uncertain && !body.masked;
+}
 
 void SelfTests::setBodies(const std::vector<SceneBody>& bodies) {
   unfolded_.clear();
@@ -35,32 +34,19 @@ void SelfTests::choose(const Part& part, const std::vector<std::uint8_t>& apart,
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!meetsItself(bodies[b].setup)) continue;
     unfolded_[b].clear();
-    if (staysApart(part, b, apart)) {
-      if (part.observer) {
-        part.observer->onSelfLeftOut(b, "the whole body moves without turning, and was apart from itself before");
-      }
-      continue;
-    }
+    if (staysApart(part, b, apart)) continue;
     const Deadline::Clock::time_point start = Deadline::Clock::now();
-    const bool whole = certify(part, b, stats);
+    const bool unfolded = certify(part, b);
+    stats.unfolded_bodies += unfolded;
     stats[Effect::SELF_COLLISION].ms += msSince(start);
-    tested_[b] = !whole;
-    if (whole && part.observer) {
-      part.observer->onSelfLeftOut(b, "the whole surface certainly does not fold onto itself in this step");
-    }
+    tested_[b] = !unfolded;
   }
 }
 
-/// True: all of it is certified.
-bool SelfTests::certify(const Part& part, std::size_t b, StepStats& stats) {
-  if (!mayBeUnfolded(part, b)) return false;
-  Unfolded& unfolded = unfolded_[b];
-  unfolded.run(part.scene.bodies()[b], part.scene.vertices(), std::cref(part.prepared.threads));
-  const bool whole = unfolded.isWhole();
-  if (part.observer && !whole) unfolded.clear();  // it wants to see the pairs
-  stats.unfolded_bodies += whole;
-  stats.unfolded_parts += whole ? 0 : unfolded.partCount();
-  return whole;
+bool SelfTests::certify(const Part& part, std::size_t b) {
+  if (!mayBeUnfolded(part.options(), part.scene, b)) return false;
+  unfolded_[b].run(part.scene.bodies()[b], part.scene.vertices(), std::cref(part.prepared.threads));
+  return unfolded_[b].isCertified();
 }
 
 }  // namespace dccd

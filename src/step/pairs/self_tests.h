@@ -9,7 +9,11 @@
 
 namespace dccd {
 
+struct Options;
 struct Part;
+
+/// The certificate has something to say of the body and itself in this step.
+bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t body);
 
 class SelfTests {
  public:
@@ -17,12 +21,12 @@ class SelfTests {
   /// apart: Carried::apart.
   void choose(const Part& part, const std::vector<std::uint8_t>& apart, StepStats& stats);
 
-  /// Per body: its pairs with itself are looked at, but for those in its unfolded parts.
+  /// Per body: its pairs with itself are looked at.
   const std::vector<std::uint8_t>& tested() const { return tested_; }
   const std::vector<Unfolded>& unfolded() const { return unfolded_; }
 
  private:
-  bool certify(const Part& part, std::size_t body, StepStats& stats);
+  bool certify(const Part& part, std::size_t body);
 
   std::vector<std::uint8_t> tested_;
   std::vector<Unfolded> unfolded_;  // per body

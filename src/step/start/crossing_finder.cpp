@@ -44,9 +44,8 @@ void CrossingFinder::test(const double* positions, std::size_t first, std::size_
   }
 }
 
-std::size_t CrossingFinder::addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
+std::size_t CrossingFinder::addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count,
                                        std::vector<EdgeFace>& found) {
-  const double* positions = at == 0 ? scene.vertices()->t0 : scene.vertices()->t1;
   std::size_t tested = 0;
   for (const EdgeFace *end = pairs + count, *next = pairs; next != end;) {
     pairs_.clear();
@@ -58,7 +57,7 @@ std::size_t CrossingFinder::addMeeting(const SceneArrays& scene, const EdgeFace*
                               scene.bodies()[next->face_body].holds(FeatureKind::FACE, next->face);
       if (is_checked) add(scene, *next);
     }
-    test(positions, 0, pairs_.size(), found);
+    test(scene.vertices()->t0, 0, pairs_.size(), found);
     tested += pairs_.size();
   }
   pairs_.clear();

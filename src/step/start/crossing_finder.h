@@ -39,9 +39,8 @@ class CrossingFinder {
   };
   void begin(const Search& search);
 
-  /// Appends those pairs to found that are checked and meet at one of the step's ends (0 or 1). Returns how many were
-  /// tested.
-  std::size_t addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
+  /// Appends those pairs to found that are checked and meet at t=0. Returns how many were tested.
+  std::size_t addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count,
                          std::vector<EdgeFace>& found);
 
   /// Edges against faces of pairs of groups of the trees of edges and of faces.

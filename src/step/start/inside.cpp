@@ -21,24 +21,22 @@ int sideOf(const double* p, const double* q, const double* point) {
   return (q[0] > p[0]) - (q[0] < p[0]);
 }
 
-/// Calls visit(slot) for the features whose bounds at `at` the half-line from the record along +z meets. Bounds hold
+/// Calls visit(slot) for the features whose bounds at t=0 the half-line from the record along +z meets. Bounds hold
 /// their features, and records keep the order of coordinates, so no feature that the half-line meets is missed.
 template <class Visit>
-void visitAbove(const ClusterTree& tree, const std::uint16_t* record, int at, std::size_t level, std::size_t group,
+void visitAbove(const ClusterTree& tree, const std::uint16_t* record, std::size_t level, std::size_t group,
                 const Visit& visit) {
   if (level == 0) tree.needLeaves(group);
-  const std::uint16_t* from = record + at * simd::DIRECTIONS;
-  const std::uint16_t* low =
-      tree.level(level).soa.data() + group * simd::SOA_SIZE + simd::soaIndex(at * simd::DIRECTIONS, 0);
+  const std::uint16_t* low = tree.level(level).soa.data() + group * simd::SOA_SIZE;
   const std::uint16_t* high = low + simd::SOA_SIZE / 2;
   for (std::size_t lane = 0; lane < simd::GROUP; ++lane) {
     const auto lowest = [&](std::size_t axis) { return low[simd::soaIndex(axis, lane)]; };
     const auto highest = [&](std::size_t axis) { return simd::turned(high[simd::soaIndex(axis, lane)]); };
-    if (lowest(0) > from[0] || highest(0) < from[0] || lowest(1) > from[1] || highest(1) < from[1]) continue;
-    if (highest(2) < from[2]) continue;
+    if (lowest(0) > record[0] || highest(0) < record[0] || lowest(1) > record[1] || highest(1) < record[1]) continue;
+    if (highest(2) < record[2]) continue;
     const std::size_t node = group * simd::GROUP + lane;
     if (level > 0) {
-      if (node < tree.level(level - 1).groups) visitAbove(tree, record, at, level - 1, node, visit);
+      if (node < tree.level(level - 1).groups) visitAbove(tree, record, level - 1, node, visit);
     } else if (node < tree.featureCount()) {
       visit(node);
     }
@@ -60,14 +58,14 @@ Sight sightOf(const double* point, const double* a, const double* b, const doubl
   return !level || side * orientation3d(a, b, c, point) < 0 ? Sight::ABOVE : Sight::PAST;
 }
 
-bool InsideSearch::isInside(const SceneArrays& scene, const Question& question, int at) {
+bool InsideSearch::isInside(const SceneArrays& scene, const Question& question) {
   // A far body is inside of nothing, and where it is in this step was perhaps not recorded.
   if (scene.bodies()[question.body].far || scene.bodies()[question.closed].far) return false;
-  const auto x = [&](Index v) { return at == 0 ? scene.vertices()[v].t0 : scene.vertices()[v].t1; };
+  const auto x = [&](Index v) { return scene.vertices()[v].t0; };
   const ClusterTree& faces = scene.bodies()[question.closed].tree(FeatureKind::FACE);
   const double* point = x(question.internal);
   bool touched = false, enclosed = false;
-  visitAbove(faces, scene.record(question.internal), at, faces.height() - 1, 0, [&](std::size_t slot) {
+  visitAbove(faces, scene.record(question.internal), faces.height() - 1, 0, [&](std::size_t slot) {
     if (touched || scene.bodies()[question.closed].isRepeated(slot)) return;
     const Index* f = faces.feature(slot);
     const Sight sight = sightOf(point, x(f[0]), x(f[1]), x(f[2]));
@@ -114,22 +112,6 @@ bool InsideSearch::takeSurfaces(const SceneArrays& scene) {
   return same;
 }
 
-bool InsideSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,
-                           std::vector<StartIntersection>& out) const {
-  std::vector<Question> inside;
-  for (const Question& q : inside_) {
-    if (!std::binary_search(open_.begin(), open_.end(), q)) inside.push_back(q);
-  }
-  bool whole = true;
-  for (const Question& q : open_) {
-    whole = whole && !deadline.isOver();
-    if (whole && isInside(scene, q, 1)) inside.push_back(q);
-  }
-  std::sort(inside.begin(), inside.end());
-  list(inside, out);
-  return whole;
-}
-
 void InsideSearch::list(const std::vector<Question>& inside, std::vector<StartIntersection>& out) {
   out.clear();
   for (const Question& q : inside) {
@@ -142,7 +124,7 @@ void InsideSearch::list(const std::vector<Question>& inside, std::vector<StartIn
 
 void InsideSearch::ask(const SceneArrays& scene, const Question& question) {
   ++asked_;
-  if (isInside(scene, question, 0)) inside_.push_back(question);
+  if (isInside(scene, question)) inside_.push_back(question);
 }
 
 void InsideSearch::askOpen(const SceneArrays& scene, const Deadline& deadline) {

@@ -54,12 +54,6 @@ class InsideSearch {
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete);
 
-  /// After remember(): whether listEnd() can tell what is inside at t=1.
-  bool knowsEnd() const { return known_ && searched_; }
-  /// What is inside at t=1, listed as run() would for a step that continues. False: the deadline ended it. Changes
-  /// nothing.
-  bool listEnd(const SceneArrays& scene, const Deadline& deadline, std::vector<StartIntersection>& out) const;
-
   /// Nothing is known of a step before: the next run() asks about all pairs.
   void clear();
   bool isClear() const { return !known_ && !searched_ && inside_.empty() && open_.empty(); }
@@ -84,7 +78,7 @@ class InsideSearch {
 
   bool takeSurfaces(const SceneArrays& scene);
   static void list(const std::vector<Question>& inside, std::vector<StartIntersection>& out);
-  static bool isInside(const SceneArrays& scene, const Question& question, int at);  ///< at: 0 or 1, of the step's ends
+  static bool isInside(const SceneArrays& scene, const Question& question);  ///< at t=0
   void askOpen(const SceneArrays& scene, const Deadline& deadline);
   void search(const SceneArrays& scene, const Deadline& deadline);
   bool searchBodies(const SceneArrays& scene, const Deadline& deadline);

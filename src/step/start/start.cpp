@@ -9,52 +9,37 @@ namespace {
 
 using Clock = Deadline::Clock;
 
-/// By the step that this one begins at.
-bool isStartKnown(const Part& part) {
-  if (!part.begins_at) return false;
-  const Carried& before = part.begins_at->carried;
-  return !before.end.empty() && before.start_state.knowsEnd() && before.inside.knowsEnd();
-}
-
 /// What meets or is inside at t=0; with earliest_only one that meets is enough. False: the deadline ended it. The
 /// vertices come first, for they are few.
 bool listStart(const Part& part, const Deadline& deadline, const std::vector<Unfolded>& unfolded, Carried& carried,
                Findings& result, std::vector<StartIntersection>& met) {
-  std::vector<StartIntersection> inside;
-  bool whole = false;
   const Options& options = part.options();
-  if (isStartKnown(part)) {
-    History::Impl& before = *part.begins_at;
-    whole = before.carried.inside.listEnd(before.scene, deadline, inside);
-    whole = before.carried.start_state.listEnd(before.scene, deadline, met) && whole;
-  } else {
-    const Threads& threads = part.prepared.threads;
-    inside = carried.inside.run(part.scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
-    met = carried.start_state.run(part.scene, part.continues, deadline, result.stats,
-                                  {foundLimit(options, part.scene.bodies()), options.earliest_only, &unfolded},
-                                  threads.count(), std::cref(threads));
-    const bool is_enough = options.earliest_only && !met.empty();
-    if (carried.start_state.isCut() && !is_enough) result.cut = true;
-    whole = is_enough || (carried.inside.isWhole() && carried.start_state.isWhole());
-  }
+  const Threads& threads = part.prepared.threads;
+  const std::vector<StartIntersection> inside =
+      carried.inside.run(part.scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
+  met = carried.start_state.run(part.scene, part.continues, deadline, result.stats,
+                                {foundLimit(options, part.scene.bodies()), options.earliest_only, &unfolded},
+                                threads.count(), std::cref(threads));
+  const bool is_enough = options.earliest_only && !met.empty();
+  if (carried.start_state.isCut() && !is_enough) result.cut = true;
   met.insert(met.end(), inside.begin(), inside.end());
-  return whole;
+  return is_enough || (carried.inside.isWhole() && carried.start_state.isWhole());
 }
 
 }  // namespace
 
 bool searchesStart(const Part& part, const Carried& carried) {
-  return part.checksStartState() && !isStartKnown(part) && carried.start_state.needsTrees(part.continues);
+  return part.checksStartState() && carried.start_state.needsTrees(part.continues);
 }
 
 void findStartState(const Part& part, bool all_known, const std::vector<Unfolded>& unfolded, Carried& carried,
                     Findings& result) {
-  const auto forget = [&] {
+  // Edges alone have no inside, and do not cross but in a contact.
+  if (!part.checksStartState() || !(part.scene.hasFaces() || part.prepared.map.surface)) {
     carried.start_state.clear();
     carried.inside.clear();
-  };
-  // Edges alone have no inside, and do not cross but in a contact.
-  if (!part.checksStartState() || !(part.scene.hasFaces() || part.prepared.map.surface)) return forget();
+    return;
+  }
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   // Contacts are still to be joined, counted and cut.
@@ -73,13 +58,9 @@ void findStartState(const Part& part, bool all_known, const std::vector<Unfolded
   } else {
     result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
   }
-  if (isStartKnown(part)) {
-    forget();
-  } else {
-    const bool complete = all_known && stats.unchecked_vertices == 0;
-    carried.start_state.remember(part.scene, result.contacts, complete);
-    carried.inside.remember(part.scene, result.contacts, complete);
-  }
+  const bool complete = all_known && stats.unchecked_vertices == 0;
+  carried.start_state.remember(part.scene, result.contacts, complete);
+  carried.inside.remember(part.scene, result.contacts, complete);
   stats[Stage::START_STATE].ms += msSince(start);
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
 }

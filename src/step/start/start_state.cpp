@@ -49,8 +49,7 @@ struct FeaturesOfBody {
 };
 
 /// Of faces, or of the edges of a and the faces of b.
-TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, bool by_faces,
-                 const std::vector<Unfolded>* unfolded) {
+TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, bool by_faces) {
   const FeatureKind first = by_faces ? FeatureKind::FACE : FeatureKind::EDGE;
   TreePair trees;
   trees.a = &scene.bodies()[a].tree(first);
@@ -58,10 +57,6 @@ TreePair treesOf(const SceneArrays& scene, std::uint32_t a, std::uint32_t b, boo
   trees.span.times = Times::T0;
   trees.adjacent = a == b;
   trees.self = by_faces && a == b;
-  if (a == b && unfolded) {  // what does not meet during the step does not at t=0
-    trees.parts_a = (*unfolded)[a].parts(first);
-    trees.parts_b = (*unfolded)[a].parts(FeatureKind::FACE);
-  }
   return trees;
 }
 
@@ -171,22 +166,6 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
   });
 }
 
-bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,
-                               std::vector<StartIntersection>& out) {
-  std::vector<EdgeFace> pairs = candidates_, met;
-  pairs.insert(pairs.end(), found_.begin(), found_.end());
-  std::size_t expanded = 0;
-  const bool whole = inBlocks(
-      pairs, met, deadline, [&] { return expanded < touched_.size(); },
-      [&] { addCandidates(scene, touched_[expanded++], pairs); },
-      [&](const EdgeFace* first, std::size_t count) {
-        finders_.local().addMeeting(scene, first, count, 1, met);
-        return true;
-      });
-  list(scene, met, out, oneByOne);
-  return whole;
-}
-
 /// Takes the pairs from the back, a block at a time, and calls test(pairs, count) with it: sorted, many are the same
 /// and those that follow each other lie together. expand() adds pairs as long as hasMore(). False: the deadline before
 /// the listing of what is found, or a test that returned false, ended it.
@@ -218,7 +197,7 @@ void StartStateSearch::testCandidates(const SceneArrays& scene, const Deadline& 
         touched_.pop_back();
       },
       [&](const EdgeFace* first, std::size_t count) {
-        tested_ += finders_.local().addMeeting(scene, first, count, 0, found_);
+        tested_ += finders_.local().addMeeting(scene, first, count, found_);
         return !hasEnough();
       });
 }
@@ -334,10 +313,11 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
                                     const Parallel& parallel) {
   const std::uint32_t a = next_bodies_[0], b = next_bodies_[1];
   const bool by_faces = by_faces_[a] && by_faces_[b];
-  TreePair trees = treesOf(scene, a, b, by_faces, unfolded_);
+  TreePair trees = treesOf(scene, a, b, by_faces);
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
   if (beforeListing(deadline).isOver()) return false;
-  if (a == b && unfolded_ && (*unfolded_)[a].isWhole()) return true;
+  // What does not meet during the step does not at t=0.
+  if (a == b && unfolded_ && (*unfolded_)[a].isCertified()) return true;
   learnNeighbourhoods(scene);
   for (const std::uint32_t body : next_bodies_) {
     if (by_faces) neighbourhoods_[body].learnFaces(scene.bodies()[body]);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "culling/scene_arrays.h"
+#include "culling/unfolded.h"
 #include "dccd/deadline.h"
 #include "step/pairs/found_limit.h"
 #include "step/start/crossing_finder.h"
@@ -91,11 +92,6 @@ class StartStateSearch {
 
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete);
-
-  /// After remember(): whether listEnd() can tell what meets at t=1.
-  bool knowsEnd() const { return known_ && searched_; }
-  /// What meets at t=1, listed as run() would for a step that continues. False: the deadline ended it. Changes nothing.
-  bool listEnd(const SceneArrays& scene, const Deadline& deadline, std::vector<StartIntersection>& out);
 
   /// Nothing is known of a step before: the next run() is a full test.
   void clear();

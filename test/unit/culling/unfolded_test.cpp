@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "support/closed_meshes.h"
 #include "support/detector.h"
+#include "support/surfaces.h"
 
 namespace dccd {
 namespace {
@@ -135,12 +138,91 @@ TEST(Unfolded, OnePieceTheSameWayRound) {
     faces.push_back({i, i + 12, j});
     faces.push_back({j, i + 12, j + 12});
   }
-  const Topology closed_ring = Topology::fromTriangles(24, faces);
-  EXPECT_TRUE(certified(closed_ring, ring, ring)) << "it may have a hole";
-  EXPECT_EQ(trueContacts(closed_ring, ring, ring), 0u);
-  Positions inside_out = ring;
-  for (std::size_t i = 0; i < 12; ++i) inside_out[i] *= 1.4;  // beyond the outer border
-  EXPECT_FALSE(certified(closed_ring, ring, inside_out));
+  EXPECT_FALSE(certified(Topology::fromTriangles(24, faces), ring, ring)) << "a hole";
+  faces.pop_back();
+  EXPECT_FALSE(certified(Topology::fromTriangles(24, faces), ring, ring)) << "a border that comes to a vertex twice";
+  faces.pop_back();
+  EXPECT_TRUE(certified(Topology::fromTriangles(24, faces), ring, ring));
+}
+
+TEST(Unfolded, NotAroundFacesTheOtherWayRoundOrThreeAtAnEdge) {
+  const std::size_t side = 41;
+  const Positions flat = test::rolled(side, 0);
+  const std::vector<Face> faces = Topology::grid(side, side).faces();
+  const auto isCertified = [&](const std::vector<Face>& list) {
+    return certified(Topology::fromTriangles(side * side, list), flat, flat);
+  };
+  EXPECT_TRUE(isCertified(faces));
+  std::vector<Face> turned = faces, three = faces, holed = faces;
+  std::swap(turned[1600][1], turned[1600][2]);
+  three.push_back({faces[1600][0], faces[1600][1], faces[10][0]});
+  holed.erase(holed.begin() + 1640, holed.begin() + 1646);
+  for (const std::vector<Face>& list : {turned, three, holed}) EXPECT_FALSE(isCertified(list));
+}
+
+/// A sheet that waves, and a small ball that falls onto the middle of it.
+test::TestStep struckSheet(double fall) {
+  const std::size_t side = 61;
+  test::TestStep step;
+  step.bodies = {{}, test::ball({0.5, 0.5, 0.2}, 0.05, 1)};
+  step.bodies[0].topology = Topology::grid(side, side);
+  step.bodies[0].t0 = step.bodies[0].t1 = test::rolled(side, 0);
+  for (Vec3& p : step.bodies[0].t1) p.z() += 0.01 * std::sin(9 * p.x());
+  step.bodies[1].t1 = step.bodies[1].t0;
+  for (Vec3& p : step.bodies[1].t1) p.z() -= fall;
+  return step;
+}
+
+// The bounds of a certified body's leaves are made where another body asks for them, some of them after others have
+// been shortened.
+TEST(Unfolded, WhatOthersMeetOfItIsTheSame) {
+  for (const bool earliest_only : {false, true}) {
+    const test::TestStep step = struckSheet(0.4);
+    std::vector<Outcome> outcomes;
+    for (const int threads : {0, 1, 2}) {
+      Options options;
+      options.unfolded_test = threads > 0;
+      options.earliest_only = earliest_only;
+      options.num_threads = std::max(threads, 1);
+      outcomes.push_back(test::Detector(options).run(step.motion()));
+    }
+    ASSERT_GT(outcomes[0].contacts.size(), 0u);
+    EXPECT_LT(outcomes[0].contacts[0].toc_upper, 0.75) << "else no bounds are shortened";
+    EXPECT_EQ(outcomes[0].stats.unfolded_bodies, 0u);
+    for (const Outcome* culled : {&outcomes[1], &outcomes[2]}) {
+      EXPECT_EQ(culled->stats.unfolded_bodies, 1u);
+      EXPECT_EQ(culled->start_state, StartState::CLEAR);
+      ASSERT_EQ(culled->contacts.size(), outcomes[0].contacts.size());
+      for (std::size_t i = 0; i < culled->contacts.size(); ++i) {
+        EXPECT_EQ(culled->contacts[i].vertex, outcomes[0].contacts[i].vertex);
+        EXPECT_EQ(culled->contacts[i].toc_lower, outcomes[0].contacts[i].toc_lower);
+      }
+    }
+  }
+}
+
+TEST(Unfolded, NothingWithoutAllVertices) {
+  test::TestStep step = struckSheet(0.1);
+  EXPECT_EQ(test::Detector().run(step.motion()).stats.unfolded_bodies, 1u);
+  Step masked = step.motion();
+  masked.bodies[0].vertex_mask = {5};
+  EXPECT_EQ(test::Detector().run(masked).stats.unfolded_bodies, 0u);
+}
+
+TEST(Unfolded, AnotherDirectionIsTriedInTheNextStep) {
+  // Its ends lie above each other, but not as they are seen from the side.
+  Body body;
+  body.topology = std::make_shared<const Topology>(Topology::grid(2, 60));
+  const Positions low = strip(60, 1.1, 0, 0.5), high = strip(60, 1.1, 0, 0.52);
+  const Step step = test::stepOf(body, low, high);
+  test::Detector stream;
+  std::vector<bool> certified;
+  for (int i = 0; i < 30; ++i) certified.push_back(stream.run(step).stats.unfolded_bodies == 1);
+  EXPECT_FALSE(certified[0]);
+  const auto first = std::find(certified.begin(), certified.end(), true);
+  EXPECT_LT(first - certified.begin(), 24);
+  EXPECT_EQ(std::find(first, certified.end(), false), certified.end()) << "it keeps to the direction that held";
+  EXPECT_EQ(trueContacts(*body.topology, low, high), 0u);
 }
 
 TEST(Unfolded, NothingIsCertifiedOfFoldsAndDegenerateFaces) {

@@ -41,7 +41,7 @@ TEST_F(FlightRecorderTest, KeepsTheLastSteps) {
 
 TEST_F(FlightRecorderTest, TwoInOneFolderOverwriteNothing) {
   RecordedScene scene;
-  FlightRecorder one(2, folder_, nullptr, "one"), same(2, folder_, nullptr, "one"), other(2, folder_, nullptr, "other");
+  FlightRecorder one(2, folder_, "one"), same(2, folder_, "one"), other(2, folder_, "other");
   for (int i = 0; i < 2; ++i) {
     const Outcome outcome = scene.nextFrames();
     for (FlightRecorder* recorder : {&one, &same, &other}) {

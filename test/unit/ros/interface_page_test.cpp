@@ -197,7 +197,6 @@ Defaults inForceOfTheNode() {
           {"clearance/max_m", plain(detector.clearance.max_m)},
           {"clearance/self_m", plain(detector.clearance.self_m)},
           {"max_contacts", plain(detector.max_contacts)},
-          {"earliest_only", plain(detector.earliest_only)},
           {"max_memory_mb", plain(config.max_memory_bytes / MB)},
           {"max_compute_s", plain(detector.max_compute_ms / 1e3)},
           {"initial_contacts", detector.suppress_initial ? "suppress" : "report"},

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <sstream>
 
 #include "output/advice.h"
@@ -48,15 +49,32 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
 }
 
 // Its cost stands in ~stats under the name that its decision has in ~effects.
-TEST(Stats, EachEffectHasARowOfItsName) {
+TEST(Stats, EachStageAndEffectHasARowOfItsName) {
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  std::uint64_t value = 100;
+  std::map<std::string, StageStats> given;
+  const auto give = [&](const char* name, StageStats& one) {
+    if (!given.count(name)) one = given[name] = {value, value + 1, static_cast<double>(value + 2)};
+    value += 3;
+  };
+  for (std::size_t s = 0; s < outcome.stats.stages.size(); ++s) {
+    give(toString(static_cast<Stage>(s)), outcome.stats.stages[s]);
+  }
+  for (std::size_t e = 0; e < outcome.stats.effects.size(); ++e) {
+    give(toString(static_cast<Effect>(e)), outcome.stats.effects[e]);
+  }
   const std::string definition = ros::message_traits::definition<deformable_ccd::StepStats>();
-  for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
-    const std::string name = toString(static_cast<Effect>(e));
-    for (const char* field : {"uint64 %_in", "uint64 %_out", "float64 %_ms"}) {
-      std::string line = std::string("\n") + field;
-      line.replace(line.find('%'), 1, name);
-      EXPECT_NE(definition.find(line), std::string::npos) << line;
-    }
+  const auto rows = toStepStats(outcome, {}, "world").stages;
+  EXPECT_EQ(rows.size(), given.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    ASSERT_EQ(given.count(rows[i].name), 1u) << rows[i].name;
+    const StageStats one = given[rows[i].name];
+    given.erase(rows[i].name);
+    EXPECT_EQ(rows[i].count_in, one.in) << rows[i].name;
+    EXPECT_EQ(rows[i].count_out, one.out) << rows[i].name;
+    EXPECT_EQ(rows[i].ms, one.ms) << rows[i].name;
+    const std::string told = " " + std::to_string(i) + " " + rows[i].name;
+    EXPECT_NE(definition.find(told), std::string::npos) << "the message's comment says the order:" << told;
   }
 }
 

@@ -112,10 +112,7 @@ TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
   unknown.bodies[0].against_obstacle = false;
   EXPECT_FALSE(EffectPlan(unknown, {{Effect::UNKNOWN_SPACE, EffectSetting::ON}}).running(Effect::UNKNOWN_SPACE));
 
-  EffectScene first = cloth();
-  EXPECT_TRUE(EffectPlan(first, {}).running(Effect::PATCHES));
-  first.earliest_only = true;
-  expectRefused(first, Effect::PATCHES, "earliest_only is true, and patches are made of all contacts");
+  EXPECT_TRUE(EffectPlan(cloth(), {}).running(Effect::PATCHES));
 
   EffectScene seen = cloth();
   expectRefused(seen, Effect::OWN_VOXELS, "own_voxels_m is 0 for every body; set it above");

@@ -24,12 +24,9 @@ void expectFresh(History& history) {
   EXPECT_EQ(now.apart, then.apart);
   EXPECT_TRUE(then.start_state.isClear());
   EXPECT_TRUE(now.start_state.isClear());
-  EXPECT_FALSE(now.start_state.knowsEnd());
   EXPECT_TRUE(then.inside.isClear());
   EXPECT_TRUE(now.inside.isClear());
-  EXPECT_FALSE(now.inside.knowsEnd());
   EXPECT_TRUE(now.map.empty());
-  EXPECT_EQ(history.impl().begins_at, nullptr);
   EXPECT_TRUE(history.isClear());
 }
 
@@ -246,34 +243,6 @@ TEST(History, EverySeamOfAStreamLeavesNothingBehind) {
       expectSameAnswer(stream.monitor.checkNow(), fresh.monitor.checkNow());
     }
     EXPECT_GE(answered, 3);
-  }
-}
-
-TEST(History, AStepAsideBeginsWhereItIsToldOnce) {
-  const TestStep first = clothsInABox(), next = nextOf(first);
-  Detector detector;
-  detector.run(first.motion());
-  Step broken = next.motion();
-  broken.bodies[1].t1 = share(Positions(3, Vec3::Zero()));
-  // Apart from all others: what the other history knows of the start would be wrong of it.
-  TestStep apart = next;
-  apart.bodies.pop_back();
-  apart.bodies[1].t0 = apart.bodies[1].t1 = movedBy(apart.bodies[1].t0, Vec3::Constant(100));
-  const Outcome alone = runOnce(apart, {});
-  const std::vector<std::pair<const char*, std::function<void(History&)>>> ends = {
-      {"it is answered", [&](History& aside) { detect(next.motion(), {}, aside); }},
-      {"it throws", [&](History& aside) { EXPECT_THROW(detect(broken, {}, aside), std::invalid_argument); }},
-      {"it is cleared", [](History& aside) { aside.clear(); }},
-  };
-  for (const auto& [name, end] : ends) {
-    SCOPED_TRACE(name);
-    History aside;
-    aside.beginAt(detector.history());
-    EXPECT_FALSE(aside.isClear());
-    end(aside);
-    aside.clear();
-    expectFresh(aside);
-    expectSame(detect(apart.motion(), {}, aside), alone);
   }
 }
 

@@ -300,23 +300,6 @@ TEST(Inside, ABoxAtRestIsSewnOnceSomethingComesNear) {
   }
 }
 
-// A prediction is told by the step that it begins at.
-TEST(Inside, APredictionKnowsItsStart) {
-  TestStep step = clothInABox();
-  const Positions outside = movedBy(step.bodies[0].t0, {0, 0, 5});
-  History history, aside;
-  for (const Positions& end : {step.bodies[0].t0, outside, outside, step.bodies[0].t0}) {
-    step = step.continued({end, step.bodies[1].t0});
-    detect(step.motion(), {}, history);
-    const TestStep ahead = step.continued({end, step.bodies[1].t0});
-    aside.beginAt(history);
-    const Outcome predicted = detect(ahead.motion(), {}, aside);
-    EXPECT_TRUE(same(predicted.intersections, startOf(ahead).intersections));
-    EXPECT_EQ(predicted.start_state, startOf(ahead).start_state);
-    EXPECT_EQ(predicted.stats[Stage::START_STATE].in, 0u) << "without a search";
-  }
-}
-
 TEST(Inside, ASearchThatIsCutGoesOnAndNeverSaysOutside) {
   TestStep step;
   for (int i = 0; i < 6; ++i) step.bodies.push_back(clothAt({-0.8 + 0.2 * i, 0.1, 0.3 - 0.1 * i}));
@@ -341,15 +324,12 @@ TEST(Inside, ASearchThatIsCutGoesOnAndNeverSaysOutside) {
     EXPECT_TRUE(same(listed, {expected.begin(), expected.begin() + static_cast<std::ptrdiff_t>(listed.size())}));
     before = listed.size();
     search.remember(scene, {}, true);
-    EXPECT_EQ(search.knowsEnd(), whole);
   }
   EXPECT_EQ(before, expected.size());
   EXPECT_GT(cuts, 5);
   InsideSearch ended;
   EXPECT_TRUE(ended.run(scene, false, Deadline(Deadline::Clock::now()), stats).empty());
   EXPECT_FALSE(ended.isWhole());
-  ended.remember(scene, {}, false);
-  EXPECT_FALSE(ended.knowsEnd());
 }
 
 // --- in a stream -----------------------------------------------------------------------------------------------------

@@ -221,7 +221,7 @@ TEST(StartState, ASurfaceThatCertainlyDoesNotFoldIsNotSearched) {
 // A search that is cut goes on in the next step, while everything moves: cut at any place, it lists nothing that is
 // not there, and once it has come to the end, all that is.
 TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
-  std::size_t cuts = 0, found_later = 0, ends_known = 0;
+  std::size_t cuts = 0, found_later = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Draw draw = drawFrom(900 + seed);
     TestStep step = randomStep(draw, 8);
@@ -244,26 +244,18 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
         }
       }
       test.remember(scene.arrays, contactsOf(step), true);
-      std::vector<StartIntersection> at_end;
-      const bool end_known = test.knowsEnd();
-      if (end_known) EXPECT_TRUE(test.listEnd(scene.arrays, NO_DEADLINE, at_end));
       std::vector<Positions> ends;
       for (const StepBody& body : step.bodies) {
         ends.push_back(body.t1);
         for (Vec3& x : ends.back()) x += Vec3(draw(-4, 4), draw(-4, 4), draw(-4, 4)) / 8.0;
       }
       step = step.continued(ends);
-      if (end_known) {
-        ++ends_known;
-        ASSERT_TRUE(same(at_end, trueIntersections(step))) << "seed " << seed << ", end of step " << i;
-      }
       scene.record(step);
     }
     EXPECT_TRUE(whole) << "seed " << seed;
   }
   EXPECT_GT(cuts, 50u);
   EXPECT_GT(found_later, 0u);
-  EXPECT_GT(ends_known, 50u);
 }
 
 // Where only the first contact is wanted, one edge through a face says that the step begins too late for it.

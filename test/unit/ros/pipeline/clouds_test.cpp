@@ -51,8 +51,8 @@ sensor_msgs::PointCloud2 tableFrom(double stamp_s, const std::string& frame = "c
   return cloudOf(stamp_s, points, frame);
 }
 
-XmlRpcValue cloudScene() {
-  XmlRpcValue tree = scene();
+XmlRpcValue cloudScene(const std::string& more = "") {
+  XmlRpcValue tree = scene(more);
   tree["obstacle_cloud_topic"] = "/camera/points";
   tree["obstacle_resolution_m"] = 0.1;
   return tree;
@@ -153,12 +153,10 @@ TEST_F(Clouds, WhatCannotBecomePartOfTheMapIsSaid) {
 }
 
 TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
-  XmlRpcValue tree = cloudScene();
-  tree["unknown_space"] = "report";
-  Driven report(tree);
-  CloudMapping mapping(report.config, report.feed_tf, memory);
+  Driven occupied(cloudScene("unknown_space: occupied, unknown_box: [0, 0, 0, 1, 1, 1]"));
+  CloudMapping mapping(occupied.config, occupied.feed_tf, memory);
   mapping.setFrame("world");
-  showCamera(report);
+  showCamera(occupied);
   const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
   ASSERT_TRUE(map.known) << map.problem;
   EXPECT_TRUE(map.known->isKnown(Box{{0.05, 0.05, 0.05}, {0.2, 0.2, 0.3}}));

@@ -122,37 +122,6 @@ TEST(ExpectedContacts, APhaseIsOnFromTheNextStepAndStaysOverAReset) {
   EXPECT_EQ(driven.feed(2.2, -0.15f).touching, Touching::LASTING);
 }
 
-TEST(EarliestOnly, TheFirstContactsAloneAndNoPatches) {
-  XmlRpcValue tree = scene();
-  Driven all(tree);
-  tree["earliest_only"] = true;
-  Driven first(tree);
-  for (Driven* driven : {&all, &first}) {
-    driven->giveMap(1);
-    driven->feed(1, 0.35f, {}, "world", 0.03f);  // one corner after another arrives
-    driven->feed(1.1, -0.25f, {}, "world", 0.03f);
-    ASSERT_EQ(driven->outcome.status, StepStatus::OK);
-  }
-  EXPECT_EQ(all.pipeline.effects().plan().running(Effect::PATCHES), true);
-  EXPECT_FALSE(all.outcome.patches.empty());
-  EXPECT_FALSE(first.pipeline.effects().plan().running(Effect::PATCHES));
-  EXPECT_TRUE(first.outcome.patches.empty());
-  EXPECT_EQ(first.outcome.earliest_toc, all.outcome.earliest_toc);
-  EXPECT_GT(first.outcome.contacts.size(), 0u);
-  EXPECT_LT(first.outcome.contacts.size(), all.outcome.contacts.size());
-  EXPECT_EQ(first.outcome.touching, Touching::NEW);
-  EXPECT_FALSE(assuranceOf(first.outcome).clear());
-  tree["effects"]["patches"] = "on";
-  EXPECT_EQ(refusalOf(tree),
-            "effects/patches is on, but earliest_only is true, and patches are made of all contacts; or "
-            "write effects/patches: auto");
-  XmlRpcValue both = expecting();
-  both["earliest_only"] = true;
-  EXPECT_EQ(refusalOf(both),
-            "parameter ~earliest_only is true beside expected_contacts: the first contact may be an "
-            "expected one, which would hide all others; remove one of both");
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd

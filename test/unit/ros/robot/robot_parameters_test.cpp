@@ -171,7 +171,6 @@ TEST(RobotParameters, MistakesAreNamed) {
       {"robot: {description: d, holds: {arm: palm}}\n", "robot/holds/arm is no body"},
       {"robot: {description: d, semantic: s, holds: {mesh: group hnd}}\n", "nearest is 'group hand'"},
       {"robot: {description: d, holds: {mesh: [palm, 1]}}\n", "robot/holds/mesh must name links and groups"},
-      {"earliest_only: true\nrobot: {description: d, holds: {mesh: palm}}\n", "given beside earliest_only"},
       {"robot: d\nexpected_contacts:\n  - {between: [mesh, group hnd]}\n", "nearest is 'group hand'"},
       {"robot: d\nexpected_contacts:\n  - {between: [mesh, plam]}\n", "nearest is 'palm'"},
       {"robot: d\nminimum_separation_pairs:\n  - {between: [mesh, palm], separation_m: 0}\n"
