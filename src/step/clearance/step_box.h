@@ -46,6 +46,20 @@ struct StepBox {
       hi[k] = std::max(hi[k], other.hi[k]);
     }
   }
+  /// The largest coordinate, whatever its sign.
+  double largest() const {
+    double largest = 0;
+    for (int k = 0; k < 8; ++k) largest = std::max({largest, std::abs(lo[k]), std::abs(hi[k])});
+    return largest;
+  }
+  /// How far its corners reach along a direction in the step, or at its end alone.
+  double reach(const Vec3& direction, bool at_end) const {
+    double reach[2] = {0, 0};
+    for (int k = 0; k < 8; ++k) {
+      if (k % 4 < 3) reach[k / 4] += direction[k % 4] * (direction[k % 4] > 0 ? hi[k] : lo[k]);
+    }
+    return at_end ? reach[1] : std::max(reach[0], reach[1]);
+  }
   double length() const { return std::max({hi[4] - lo[4], hi[5] - lo[5], hi[6] - lo[6]}); }
 };
 
