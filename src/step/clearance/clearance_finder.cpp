@@ -288,6 +288,11 @@ void ClearanceFinder::search(Row& row, const ClearancePart& stretch) {
   }
   if (!last) return;
   goal.limit_m = limitOf(row) + radiusOf(row);
+  if (at_end.lower_m > 0 && at_end.upper_m < goal.limit_m) {  // the step's least is at its end, and they do not meet
+    row.at_end = at_end;
+    describe(row, stretch, row.at_end, row.answer.at_end);
+    return;
+  }
   goal.at_end = true;
   row.at_end = measure(row, stretch, goal, at_end);
   describe(row, stretch, row.at_end, row.answer.at_end);

@@ -52,17 +52,28 @@ class NearestSearch {
                     const Meet& meet) {
     begin(goal, known);
     slack_m_ = tolerance::CLEARANCE * std::max(a.box(a.root()).largest(), b.box(b.root()).largest());
-    if (goal.first) compare(a, b, {0, 0, (*goal.first)[0], (*goal.first)[1], true}, meet);
+    if (goal.first) {
+      compare(a, b, {0, 0, (*goal.first)[0], (*goal.first)[1], true}, meet);
+    } else if (!pairs.ITSELF) {
+      compareNearBoxes(a, b, meet);
+    }
     push(a, a.root(), b, b.root(), pairs);
     while (!touching_.empty() || !heap_.empty()) {
-      const Pair pair = take();
+      Pair pair = take();
       const bool is_done = prunes(pair.squared);  // nothing else is nearer
       if (is_done || isLate()) {
         found_.cut = found_.cut || !is_done;
         settleSquared(pair.squared);
         break;
       }
-      if (pair.number < direction_from_ && isApart(a, b, pair)) continue;
+      if (pair.number < direction_from_) {
+        const double squared = pair.squared;
+        if (prunesAlong(a, b, pair)) continue;
+        if (pair.squared > squared) {
+          put(pair);
+          continue;
+        }
+      }
       if (pair.items) {
         if (!pairs.leavesOut(pair.a, pair.b)) compare(a, b, pair, meet);
         continue;
@@ -108,6 +119,9 @@ class NearestSearch {
   /// What touches comes before all else, in whatever order, but items before nodes.
   void add(const Pair& pair) {
     ++number_;
+    put(pair);
+  }
+  void put(const Pair& pair) {
     if (pair.squared == 0) {
       touching_.push_back(pair);
     } else {
@@ -128,8 +142,10 @@ class NearestSearch {
   template <class A, class B, class Pairs>
   void push(const A& a, std::uint32_t in_a, const B& b, std::uint32_t in_b, Pairs& pairs) {
     const double squared = squaredGap(a.box(in_a), b.box(in_b), goal_.at_end ? 1 : 0);
-    const Pair pair{squared, number_, in_a, in_b, false};
-    if (!prunes(squared) && pairs.asked(in_a, in_b) != 0 && !isApart(a, b, pair)) add(pair);
+    Pair pair{squared, number_, in_a, in_b, false};
+    if (prunes(squared) || pairs.asked(in_a, in_b) == 0 || prunesAlong(a, b, pair)) return;
+    if (a.isLeaf(in_a) && b.isLeaf(in_b) && prunesBetween(a, a.box(in_a), b, b.box(in_b), pair)) return;
+    add(pair);
   }
 
   template <class A, class B, class Pairs>
@@ -139,9 +155,10 @@ class NearestSearch {
       const StepBox box = a.itemBox(a.first(in_a) + i);
       for (std::uint32_t j = 0; j < b.count(in_b); ++j) {
         if ((asked >> (A::LEAF * i + j) & 1) == 0) continue;
-        const double squared = squaredGap(box, b.itemBox(b.first(in_b) + j), goal_.at_end ? 1 : 0);
-        const Pair pair{squared, number_, a.first(in_a) + i, b.first(in_b) + j, true};
-        if (!prunes(squared) && !isApart(a, b, pair)) add(pair);
+        const StepBox other = b.itemBox(b.first(in_b) + j);
+        const double squared = squaredGap(box, other, goal_.at_end ? 1 : 0);
+        Pair pair{squared, number_, a.first(in_a) + i, b.first(in_b) + j, true};
+        if (!prunes(squared) && !prunesAlong(a, b, pair) && !prunesBetween(a, box, b, other, pair)) add(pair);
       }
     }
   }
@@ -172,14 +189,58 @@ class NearestSearch {
     return tree.box(in).reach(direction, goal_.at_end);
   }
 
-  /// Whether the direction shows that the two are so far apart that they need no further look.
+  /// Whether what two are certainly apart shows that they need no further look. If not, they may be farther than their
+  /// boxes.
+  bool prunesApart(double apart_m, Pair& pair) {
+    const double lower_m = apart_m - slack_m_;
+    if (lower_m >= enough_m_) {
+      settle(lower_m);
+      return true;
+    }
+    if (lower_m > 0) pair.squared = std::max(pair.squared, lower_m * lower_m * (1 - tolerance::CLEARANCE_BOX));
+    return false;
+  }
   template <class A, class B>
-  bool isApart(const A& a, const B& b, const Pair& pair) {
+  bool prunesAlong(const A& a, const B& b, Pair& pair) {
     if (!(enough_m_ > 0) || direction_from_ == 0) return false;
-    const double lower_m = -reach(a, pair.a, pair.items, -1, reach_[0]) - reach(b, pair.b, pair.items, 1, reach_[1]);
-    if (!(lower_m - slack_m_ >= enough_m_)) return false;
-    settle(lower_m - slack_m_);
-    return true;
+    const double reach_m = reach(a, pair.a, pair.items, -1, reach_[0]) + reach(b, pair.b, pair.items, 1, reach_[1]);
+    return prunesApart(-reach_m, pair);
+  }
+  /// The same of two leaves or items in the direction from one to the other: what is hollow is nearly as near in many.
+  template <class A, class B>
+  bool prunesBetween(const A& a, const StepBox& box_a, const B& b, const StepBox& box_b, Pair& pair) {
+    if (!(enough_m_ > 0)) return false;
+    const Vec3 between = box_a.middle(goal_.at_end) - box_b.middle(goal_.at_end);
+    const double length = between.norm();
+    if (!(length > 0)) return false;
+    const Vec3 direction = between / length;
+    const auto reachOf = [&](const auto& tree, std::uint32_t in, const Vec3& along) {
+      return pair.items ? tree.itemReach(in, along, goal_.at_end) : tree.leafReach(in, along, goal_.at_end);
+    };
+    return prunesApart(-reachOf(a, pair.a, -direction) - reachOf(b, pair.b, direction), pair);
+  }
+
+  /// Two items that are probably near: from each node to the child whose box is nearest.
+  template <class A, class B, class Meet>
+  void compareNearBoxes(const A& a, const B& b, const Meet& meet) {
+    const int first = goal_.at_end ? 1 : 0;
+    const auto nearer = [&](const auto& tree, std::uint32_t& in, const StepBox& box) {
+      double least = std::numeric_limits<double>::infinity();
+      const std::uint32_t parent = in;
+      tree.forChildren(parent, [&](std::uint32_t child) {
+        const double squared = squaredGap(tree.box(child), box, first);
+        if (squared < least) least = squared, in = child;
+      });
+    };
+    std::uint32_t in_a = a.root(), in_b = b.root();
+    while (!a.isLeaf(in_a) || !b.isLeaf(in_b)) {
+      if (!a.isLeaf(in_a) && (b.isLeaf(in_b) || a.box(in_a).length() >= b.box(in_b).length())) {
+        nearer(a, in_a, b.box(in_b));
+      } else {
+        nearer(b, in_b, a.box(in_a));
+      }
+    }
+    compare(a, b, {0, 0, a.first(in_a), b.first(in_b), true}, meet);
   }
 
   template <class A, class B, class Meet>
