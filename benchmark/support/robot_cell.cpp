@@ -53,16 +53,15 @@ const std::array<Link, RobotCell::LINKS>& links() {
 
 /// Of its SRDF, by the numbers of the links.
 bool neverMeet(std::size_t a, std::size_t b) {
-  static const std::set<std::pair<std::size_t, std::size_t>> NEVER{
-      {0, 1}, {0, 2}, {0, 4}, {2, 3}, {3, 4}, {1, 2}, {1, 4}, {1, 5}, {4, 5}, {4, 6}, {5, 6}};
+  static const std::set<std::pair<std::size_t, std::size_t>> NEVER{{0, 1}, {0, 2}, {0, 4}, {2, 3}, {3, 4}, {1, 2},
+                                                                   {1, 4}, {1, 5}, {4, 5}, {4, 6}, {5, 6}};
   return NEVER.count(std::minmax(a, b)) > 0;
 }
 
 test::TriangleShape standIn(const Link& link) {
   return test::revolution(link.rings, 24, link.length_m / 2, [&](double x) {
     const double left_m = link.length_m / 2 - std::abs(x);
-    return left_m >= link.radius_m ? link.radius_m
-                                   : std::sqrt(std::max(0.0, left_m * (2 * link.radius_m - left_m)));
+    return left_m >= link.radius_m ? link.radius_m : std::sqrt(std::max(0.0, left_m * (2 * link.radius_m - left_m)));
   });
 }
 

@@ -1,4 +1,5 @@
-// An ordinary cell for benchmarks: an arm of seven links over a table that a depth camera sees, and a cloth in its hand.
+// An ordinary cell for benchmarks: an arm of seven links over a table that a depth camera sees, and a cloth in its
+// hand.
 #pragma once
 
 #include <memory>
@@ -15,8 +16,8 @@ class RobotCell {
   static constexpr std::size_t LINKS = 7;
   static constexpr double PERIOD_S = 1 / 30.0;  ///< of frames; a map is in use for two steps
 
-  /// The links are the meshes of ../shared's ur5e or, where these are not there, of about as many triangles. against_links:
-  /// those links meet each other that its SRDF lets meet.
+  /// The links are the meshes of ../shared's ur5e or, where these are not there, of about as many triangles.
+  /// against_links: those links meet each other that its SRDF lets meet.
   explicit RobotCell(bool against_links);
 
   /// From frame k to the next one. Ask in order.

@@ -17,8 +17,8 @@ double partsFor(const Body& body, double pose_scale, double tolerance_m, const E
 double leavesArcBy(const Body& body, double pose_scale, double parts);
 
 /// The most that a body needs, up to 1e9; 1 where nothing turns. One does not count where neither its arcs nor its
-/// straight paths come near anything that it is tested against or, with apart_m, from which its distance is asked for up
-/// to there. before: the bodies as a step before left them.
+/// straight paths come near anything that it is tested against or, with apart_m, from which its distance is asked for
+/// up to there. before: the bodies as a step before left them.
 std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before = {},
                         double apart_m = 0);
 

@@ -122,7 +122,8 @@ struct Turning {
   Vec3 foot, shift, axis;
   double angle = 0;
 
-  Turning(const Draw& draw, double size_m, const Vec3& at) : topology(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}})) {
+  Turning(const Draw& draw, double size_m, const Vec3& at)
+      : topology(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}})) {
     const auto vector = [&](double length_m) {
       return Vec3(Vec3(draw(-9, 9), draw(-9, 9), draw(-9, 9)) * (length_m / 9));
     };

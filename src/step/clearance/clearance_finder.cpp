@@ -298,8 +298,8 @@ void ClearanceFinder::search(Row& row, const ClearancePart& stretch) {
   describe(row, stretch, row.at_end, row.answer.at_end);
 }
 
-/// What was found on straight paths becomes what is known of the true ones, which meet them at a stretch's ends. Whether
-/// it is the least of the step so far.
+/// What was found on straight paths becomes what is known of the true ones, which meet them at a stretch's ends.
+/// Whether it is the least of the step so far.
 bool ClearanceFinder::takeOverStep(Row& row, const ClearancePart& stretch, const FoundDistance& found) {
   const double leaves_m = leavesArcsBy(row);
   const double upper_m = found.t > 0 && found.t < 1 ? found.upper_m + leaves_m : found.upper_m;

@@ -111,12 +111,12 @@ class DCCD_HIDDEN ClearanceFinder {
   double rigid_tolerance_m_ = 0;
   std::size_t needed_ = 1;     // stretches of the step in which what turns goes straight enough
   std::size_t stretches_ = 1;  // of each part
-  bool exact_ = true;  // a contact is a touch, not a distance
+  bool exact_ = true;          // a contact is a touch, not a distance
   std::vector<Expectation> expected_;
   std::vector<BodyState> bodies_;
   std::vector<Row> rows_;
-  std::vector<std::int32_t> row_of_;   // [a * (bodies + 1) + b], b = bodies: the map
-  std::size_t pairs_ = 0, came_ = 0;   // pairs that are asked for; stretches that came
+  std::vector<std::int32_t> row_of_;  // [a * (bodies + 1) + b], b = bodies: the map
+  std::size_t pairs_ = 0, came_ = 0;  // pairs that are asked for; stretches that came
   MapBoxes map_;
   NearestSearch search_;
 };

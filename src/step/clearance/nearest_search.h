@@ -1,7 +1,7 @@
 // The smallest distance of two trees of features: branch and bound, always on with the pair of boxes that may be
-// nearest, until none that is left can be nearer than what was found by more than the tolerance. Boxes leave much between
-// them and what is in them. So a pair is also held against the direction in which the nearest two so far are apart: along
-// it, things that bulge towards each other are no nearer beside these two.
+// nearest, until none that is left can be nearer than what was found by more than the tolerance. Boxes leave much
+// between them and what is in them. So a pair is also held against the direction in which the nearest two so far are
+// apart: along it, things that bulge towards each other are no nearer beside these two.
 //
 // The answer depends on the two trees alone, not on what was found in the step before: the search goes to the nearest
 // boxes first and so has a near pair after as many boxes as the trees are high.
@@ -163,8 +163,8 @@ class NearestSearch {
     }
   }
 
-  /// Of a tree's node or item, how far it reaches along the direction, from the start (of the end alone: from the end) to
-  /// the end of the step.
+  /// Of a tree's node or item, how far it reaches along the direction, from the start (of the end alone: from the end)
+  /// to the end of the step.
   template <class Tree>
   double reach(const Tree& tree, std::uint32_t in, bool items, double sign, std::vector<Reach>& known) {
     const Vec3 direction = sign * direction_;
@@ -177,9 +177,8 @@ class NearestSearch {
           if (tree.isLeaf(in)) {
             reach_m = tree.leafReach(in, direction, goal_.at_end);
           } else {
-            tree.forChildren(in, [&](std::uint32_t child) {
-              reach_m = std::max(reach_m, reach(tree, child, false, sign, known));
-            });
+            tree.forChildren(
+                in, [&](std::uint32_t child) { reach_m = std::max(reach_m, reach(tree, child, false, sign, known)); });
           }
           known[in] = {directions_, reach_m};
         }
@@ -259,8 +258,8 @@ class NearestSearch {
   void begin(const Goal& goal, const FoundDistance& known);
   FoundDistance result() const;
   void setEnough();
-  /// Nothing that far apart needs a further look. Whether they meet at the end is asked exactly of all that may, whatever
-  /// was found to be nearly as near before.
+  /// Nothing that far apart needs a further look. Whether they meet at the end is asked exactly of all that may,
+  /// whatever was found to be nearly as near before.
   bool prunes(double squared) {
     if (squared < enough_squared_ || (squared == 0 && goal_.at_end && found_.upper_m > 0)) return false;
     settleSquared(squared);

@@ -264,8 +264,8 @@ TEST(Clearance, OfATurningBodyIsAlongThePathThatIsTested) {
   EXPECT_GT(row.at_end.lower_m, 0.8);
 }
 
-// A rod of half a metre turns at 3 rad/s, with a frame each fifth of a second: its contacts need no part of the step, since
-// it is far by its bounds, and its chord passes the post at 52 mm where the rod itself does at 30 mm.
+// A rod of half a metre turns at 3 rad/s, with a frame each fifth of a second: its contacts need no part of the step,
+// since it is far by its bounds, and its chord passes the post at 52 mm where the rod itself does at 30 mm.
 TEST(Clearance, OfATurningBodyThatIsFarByItsBoundsIsThatOfItsArc) {
   const auto rodAt = [](double angle) { return Eigen::Isometry3d(Eigen::AngleAxisd(angle, Vec3::UnitZ())); };
   const auto passing = [&](double angle, double post_m) {
@@ -280,7 +280,8 @@ TEST(Clearance, OfATurningBodyThatIsFarByItsBoundsIsThatOfItsArc) {
       to.push_back(turning.pose_t1 * p);
     }
     Step step = stepOf(turning, from, to);
-    step.bodies.push_back(moving(bodyOf("post", TRIANGLE), movedBy(FLAT, {post_m, 0, 0}), movedBy(FLAT, {post_m, 0, 0})));
+    step.bodies.push_back(
+        moving(bodyOf("post", TRIANGLE), movedBy(FLAT, {post_m, 0, 0}), movedBy(FLAT, {post_m, 0, 0})));
     return step;
   };
   for (const double angle : {0.6, 1.2}) {  // the latter: 12 rad/s at 10 Hz

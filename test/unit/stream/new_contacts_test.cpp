@@ -71,8 +71,8 @@ TEST(NewContacts, WhatComesBackWithinTheGapLastsThoughItsStepStartsClear) {
   EXPECT_EQ(back.touching, Touching::NEW) << "as if no patches were tracked";
   for (int k = 0; k < 12; ++k) to(0.01);
   to(0);
-  std::vector<Touching> expected{Touching::NONE, Touching::NEW, Touching::LASTING, Touching::NONE, Touching::LASTING,
-                                 Touching::LASTING};
+  std::vector<Touching> expected{Touching::NONE, Touching::NEW,     Touching::LASTING,
+                                 Touching::NONE, Touching::LASTING, Touching::LASTING};
   expected.resize(17, Touching::NONE);
   expected.push_back(Touching::NEW);
   EXPECT_EQ(said, expected);
