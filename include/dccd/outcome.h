@@ -154,8 +154,8 @@ static_assert(sizeof(StepStats) == sizeof(StepStats::stages) + sizeof(StepStats:
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
 DCCD_EXPORT const char* toString(StartState state);
 
-/// Whether anything touches in a step, the first that holds of NEW, LASTING, EXPECTED, NONE. What could not be ruled out
-/// counts. In a stream what comes back within patch_gap_s is not NEW, though its step starts CLEAR.
+/// Whether anything touches in a step: the first that holds of NEW, LASTING, EXPECTED, NONE. What could not be ruled
+/// out counts. In a stream what comes back within patch_gap_s is not NEW, though its step starts CLEAR.
 enum class Touching : std::uint8_t {
   NONE = 0,
   LASTING = 1,   ///< something unexpected touches, or crossed when the step began, and nothing is NEW
