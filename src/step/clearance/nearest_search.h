@@ -109,10 +109,11 @@ class NearestSearch {
     }
   };
 
+  static constexpr double SHORTEST_M = 1e-140;     // squares of less lose digits
   static constexpr std::uint32_t MOST_KNOWN = 64;  // features of a node whose reach is that of its vertices
   /// Of a node, along the direction of that number.
   struct Reach {
-    std::uint32_t direction = 0;
+    std::uint64_t direction = 0;
     double reach_m = 0;
   };
 
@@ -211,7 +212,7 @@ class NearestSearch {
     if (!(enough_m_ > 0)) return false;
     const Vec3 between = box_a.middle(goal_.at_end) - box_b.middle(goal_.at_end);
     const double length = between.norm();
-    if (!(length > 0)) return false;
+    if (!(length > SHORTEST_M)) return false;
     const Vec3 direction = between / length;
     const auto reachOf = [&](const auto& tree, std::uint32_t in, const Vec3& along) {
       return pair.items ? tree.itemReach(in, along, goal_.at_end) : tree.leafReach(in, along, goal_.at_end);
@@ -276,7 +277,7 @@ class NearestSearch {
   FoundDistance found_;
   Vec3 direction_ = Vec3::Zero();     // from the second to the first, of the nearest two so far
   std::uint32_t direction_from_ = 0;  // the number of the first pair after it was set; 0: none is
-  std::uint32_t directions_ = 0;      // so many there were, in all searches
+  std::uint64_t directions_ = 0;      // so many there were, in all searches
   double slack_m_ = 0;                // of what is computed along it
   std::array<std::vector<Reach>, 2> reach_;
   double enough_m_ = 0, enough_squared_ = 0;
