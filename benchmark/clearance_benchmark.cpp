@@ -10,16 +10,20 @@
 #include <fcl/fcl.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <nlohmann/json.hpp>
 
+#include "dccd/safe_until.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "support/data.h"
 #include "support/detector.h"
+#include "support/robot_cell.h"
 #include "support/scene_data.h"
 #include "support/timing.h"
 
@@ -28,7 +32,11 @@ namespace benchmarks {
 namespace {
 
 /// Of this process [ms].
-double processorMs() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+double processorMs() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
 
 constexpr double SELF_M = 0.1;
 
@@ -259,6 +267,58 @@ nlohmann::json measure(const Case& c, int repeat) {
           {"ratio", quartiles(ratios)}};
 }
 
+/// What distances take more in the steps of a robot's cell: of each step the best of all rounds, as processor time; and
+/// what the promise and the scale take that follow from them.
+nlohmann::json measureCell(bool against_links, int repeat) {
+  constexpr int STEPS = 300;
+  RobotCell cell(against_links);
+  std::vector<Step> steps;
+  for (int k = 0; k <= STEPS; ++k) steps.push_back(cell.step(k));
+  constexpr double NONE = std::numeric_limits<double>::infinity();
+  std::vector<double> with(steps.size(), NONE), without = with, promises = with;
+  const std::vector<SpeedBound> bounds(steps[0].bodies.size(), SpeedBound{1.0});
+  std::size_t measured = 0, pairs = 0;
+  for (int round = 0; round < repeat; ++round) {
+    Options options;
+    options.patches = true;
+    test::Detector plain(options);
+    options.clearance.wanted = true;
+    options.clearance.max_m = 1;
+    test::Detector asked(options);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      double start = processorMs();
+      plain.run(steps[k]);
+      without[k] = std::min(without[k], processorMs() - start);
+      start = processorMs();
+      const Outcome outcome = asked.run(steps[k]);
+      with[k] = std::min(with[k], processorMs() - start);
+      start = processorMs();
+      safeUntil(outcome, bounds);
+      speedScale(outcome, bounds, {0.1, 0.3, 0.02});
+      promises[k] = std::min(promises[k], processorMs() - start);
+      if (round > 0) continue;
+      for (const Clearance& row : outcome.clearances) {
+        ++pairs;
+        measured += row.over_step.status == ClearanceStatus::MEASURED;
+      }
+    }
+  }
+  std::vector<double> more;
+  for (std::size_t k = 1; k < steps.size(); ++k)
+    more.push_back(with[k] - without[k]);  // the first makes what is made once
+  promises.erase(promises.begin());
+  nlohmann::json row{{"case", std::string("a robot's cell") + (against_links ? ", links against each other" : "")},
+                     {"real_meshes", cell.hasRealMeshes()},
+                     {"triangles", cell.triangles()},
+                     {"pairs", pairs / steps.size()},
+                     {"measured", static_cast<double>(measured) / static_cast<double>(pairs)},
+                     {"more_ms", spread(more)},
+                     {"promises_ms", spread(promises)}};
+  std::sort(more.begin(), more.end());
+  row["more_p99_ms"] = more[more.size() * 99 / 100];
+  return row;
+}
+
 int run(int argc, char** argv) {
   CLI::App app("What distances cost, and those of others beside them");
   std::string path;
@@ -280,6 +340,7 @@ int run(int argc, char** argv) {
       out["runs"].push_back(measure(folds, repeat));
     }
   }
+  for (const bool against_links : {false, true}) out["cells"].push_back(measureCell(against_links, repeat));
   if (!test::dataDir().empty()) out["runs"].push_back(measure(clothBall(), repeat));
   std::ofstream(path) << out.dump(1) << "\n";
   return 0;

@@ -264,8 +264,12 @@ void bindJudgement(Class& c) {
          "list of str: which contacts are expected, whether or not there are any, a sentence each");
   judged(
       "touching", [](const Assurance& a) { return std::string(toString(a.touching)); },
-      "str: NONE; NEW: something touches that did not when the step began; LASTING: it did; EXPECTED: all that "
-      "touches is expected. What could not be ruled out counts as touching");
+      "str, the first that holds: NEW: something touches that is not expected and is an alarm (in a Stream with "
+      "patches: "
+      "of a patch that is_new; else a contact that is not initial); LASTING: something touches, or crossed when the "
+      "step "
+      "began, that is not expected (in a Stream it may have come apart for less than patch_gap_s); EXPECTED: all that "
+      "touches is expected; NONE. What could not be ruled out counts as touching");
   judged("clear", &Assurance::clear, "bool: proved, and nothing touches");
   c.def("__str__", [](const Answer& a) { return describe(assuranceOf(a.outcome())); });
   c.def("__repr__", [](const Answer& a) {

@@ -28,7 +28,7 @@ struct Assurance {
 /// a publisher that fell silent, a reset ...; a sentence each).
 DCCD_EXPORT Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults = {});
 
-/// One line for people: "proved, nothing touches", "proved, touches since before the step", "not proved: ...; ...".
+/// One line for people: "proved, nothing touches", "proved, what touches lasts", "not proved: ...; ...".
 /// `touches` says, where something does, who whom and where.
 DCCD_EXPORT std::string describe(const Assurance& assurance, const std::string& touches = {});
 

@@ -150,12 +150,12 @@ static_assert(sizeof(StepStats) == sizeof(StepStats::stages) + sizeof(StepStats:
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
 DCCD_EXPORT const char* toString(StartState state);
 
-/// Whether anything touches in a step. What could not be ruled out counts as touching. Of several the first that holds
-/// in the order NEW, LASTING, EXPECTED, NONE.
+/// Whether anything touches in a step: the first that holds of NEW, LASTING, EXPECTED, NONE. What could not be ruled
+/// out counts. In a stream what comes back within patch_gap_s is not NEW, though its step starts CLEAR.
 enum class Touching : std::uint8_t {
   NONE = 0,
-  LASTING = 1,   ///< something unexpected touches, and did so when the step began, or crossed then
-  NEW = 2,       ///< something unexpected touches that did not when the step began
+  LASTING = 1,   ///< something unexpected touches, or crossed when the step began, and nothing is NEW
+  NEW = 2,       ///< an alarm: of a patch that is_new or, where none are tracked, an unexpected contact, not initial
   EXPECTED = 3,  ///< all that touches, or crossed when the step began, is expected
 };
 DCCD_EXPORT const char* toString(Touching touching);
@@ -224,8 +224,8 @@ struct Outcome : Findings {
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
-  std::size_t substeps = 0;                                                  ///< parts that the step was cut into
-  Touching touching = Touching::NONE;  ///< of this step alone; assuranceOf() knows what lasts
+  std::size_t substeps = 0;            ///< parts that the step was cut into
+  Touching touching = Touching::NONE;  ///< as if no patches were tracked; Assurance::touching holds
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
   std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not
   std::vector<std::string> excluded;  ///< what was left out by choice

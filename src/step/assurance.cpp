@@ -11,7 +11,7 @@ std::string joined(const std::vector<std::string>& sentences) {
   return text;
 }
 
-/// Beside what lasts, a contact that is of the same patch is not new; what lasts and was expected until now is.
+/// What is said of Touching (dccd/outcome.h): where patches are tracked, they tell what is new.
 Touching touchingOf(const Outcome& outcome) {
   if (!outcome.tracked) return outcome.touching;
   const bool any_new =
@@ -44,8 +44,8 @@ Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& fa
 }
 
 std::string describe(const Assurance& assurance, const std::string& touches) {
-  static const char* const TOUCHING[] = {"nothing touches", "what touches did so when the step began",
-                                         "something touches anew", "what touches is expected"};
+  static const char* const TOUCHING[] = {"nothing touches", "what touches lasts", "something touches anew",
+                                         "what touches is expected"};
   std::string text = assurance.proved ? "proved, " : "not proved: " + joined(assurance.missing);
   if (assurance.proved || assurance.touching != Touching::NONE) {
     text += (assurance.proved ? "" : "; ") + std::string(TOUCHING[static_cast<std::size_t>(assurance.touching)]);

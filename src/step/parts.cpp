@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "dccd/mesh_store.h"
+#include "dccd/tolerances.h"
 
 namespace dccd {
 namespace {
@@ -23,6 +24,12 @@ double radiusOf(const Body& body) {
   double squared = 0;
   for (const Vec3& p : *body.t0) squared = std::max(squared, (p - body.pose_t0.translation()).squaredNorm());
   return std::sqrt(squared);
+}
+
+/// A chord leaves its arc by this at most, which is the whole diameter from a full turn on.
+double sagitta(double radius, double angle) {
+  const double half = std::sin(std::min(angle, 2 * M_PI) / 4);
+  return radius * 2 * half * half;
 }
 
 /// Holds all of the body's ways through the step. One that turns does so about its frame's origin, which moves
@@ -53,10 +60,7 @@ Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margi
 
 double partsFor(const Body& body, double pose_scale, double tolerance_m, const Extent* extent) {
   const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1);
-  // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
-  const auto isStraight = [&](double radius) {
-    return radius * (1 - std::cos(std::min(angle, 2 * M_PI) / 2)) <= tolerance_m;
-  };
+  const auto isStraight = [&](double radius) { return sagitta(radius, angle) <= tolerance_m; };
   // The farthest corner of what its vertices span is no nearer than any of them, also as it is rounded.
   if (extent && extent->of == body.t0 && extent->is_finite) {
     const Vec3 centre = body.pose_t0.translation();
@@ -67,11 +71,23 @@ double partsFor(const Body& body, double pose_scale, double tolerance_m, const E
   return isStraight(radius) ? 1 : std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius)));
 }
 
-std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before) {
+double leavesArcBy(const Body& body, double pose_scale, double parts) {
+  if (!body.turns) return 0;
+  const double radius = radiusOf(body);
+  double largest = radius;
+  for (const Eigen::Isometry3d* pose : {&body.pose_t0, &body.pose_t1})
+    largest = std::max(largest, pose->translation().cwiseAbs().maxCoeff() + radius);
+  const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1);
+  return (sagitta(radius, angle / parts) + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
+}
+
+std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before, double apart_m) {
   std::vector<std::optional<Eigen::AlignedBox3d>> bounds(step.bodies.size());
-  const double margin_m = largestSeparation(step.bodies) + tolerance_m;  // the tolerance is far above all rounding
+  // The tolerance is far above all rounding. A distance is told less what both bodies leave their arcs by.
+  const double margin_m = std::max(largestSeparation(step.bodies), apart_m / 2) + tolerance_m;
   const auto boundsOf = [&](std::size_t b) -> const Eigen::AlignedBox3d& {
-    if (!bounds[b]) bounds[b] = sweptBounds(step, step.bodies[b], margin_m);
+    const double leaves_m = apart_m > 0 && !bounds[b] ? leavesArcBy(step.bodies[b], step.pose_scale, 1) : 0;
+    if (!bounds[b]) bounds[b] = sweptBounds(step, step.bodies[b], margin_m + leaves_m);
     return *bounds[b];
   };
   const auto isNear = [&](std::size_t b) {

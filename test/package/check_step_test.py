@@ -223,7 +223,7 @@ class SoupsTest(Files):
         away = [(x, y, z + 1) for x, y, z in self.FLOOR[1]]
         self.TOC = 0
         self.assertEqual(self.check('.stl', stl(*self.FLOOR), stl(self.FLOOR[0], away)), 0)
-        self.assertIn('what touches did so when the step began', self.said)
+        self.assertIn('what touches lasts', self.said)
         self.assertIn('0.stl: 2 vertices come apart in a later frame', self.remarks)
 
     def test_what_is_no_sequence(self):

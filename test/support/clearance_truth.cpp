@@ -285,7 +285,9 @@ std::string judgeClearances(const Step& step, const Options& options, const Outc
       }
       continue;
     }
-    say(judge(row.at_end, options, limit_m, true, leastAt(pairs, 1), "at the end"));
+    const Rational at_end = leastAt(pairs, 1);
+    say(judge(row.at_end, options, limit_m, true, at_end, "at the end"));
+    if (at_end == 0 && row.at_end.status == ClearanceStatus::MEASURED) say("meet at the end, and are MEASURED");
     std::vector<double> at{0, 1};
     for (int k = 1; k <= times; ++k) at.push_back(k / (times + 1.0));
     for (const double t : at) {

@@ -7,6 +7,7 @@
 #include "obstacle/start_contact.h"
 #include "step/conclude.h"
 #include "step/map.h"
+#include "step/parts.h"
 #include "step/start/segment_triangle.h"
 
 namespace dccd {
@@ -69,8 +70,11 @@ void ClearanceFinder::learnBodies(const ClearancePart& part) {
     BodyState& state = bodies_[b];
     const SceneBody& body = part.scene.bodies()[b];
     const Body& motion = part.step.bodies[b];
+    state.motion = part.scene.vertices() + body.internal_begin;
+    state.box = StepBox::still(body.bounds_min, body.bounds_max);
+    state.leaves_arc_m = leavesArcBy(step_->bodies[b], step_->pose_scale, static_cast<double>(part.count * stretches_));
     state.fitted = state.fitted_to_map = false;
-    state.known = body.usedCount() > 0 && isUsable(boxOf(body));
+    state.known = body.usedCount() > 0 && isUsable(state.box);
     for (std::size_t i = 0; body.masked && i < body.usedCount(); ++i) {
       state.known = state.known && (body.active[i] || !(body.asked.empty() || body.asked[body.slot_vertex[i]]));
     }
@@ -78,15 +82,39 @@ void ClearanceFinder::learnBodies(const ClearancePart& part) {
   }
 }
 
-/// The tree's boxes of this part. False: of such a size that nothing is computed with them.
-bool ClearanceFinder::fit(std::size_t b, const ClearancePart& part, bool to_map) {
+/// The bodies' ways through a stretch of a part.
+void ClearanceFinder::place(const ClearancePart& stretch) {
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    BodyState& state = bodies_[b];
+    const SceneBody& body = stretch.scene.bodies()[b];
+    const Body& motion = stretch.step.bodies[b];
+    StepBox box = StepBox::none();
+    state.placed.assign(body.usedCount(), VertexMotion{});
+    for (std::size_t i = 0; i < body.usedCount(); ++i) {
+      if (body.masked && !body.active[i]) continue;
+      const Vec3 &p = (*motion.t0)[body.slot_vertex[i]], &q = (*motion.t1)[body.slot_vertex[i]];
+      state.placed[i] = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
+      box.add(state.placed[i]);
+    }
+    for (int k = 0; k < 4; ++k) {
+      box.lo[k] = box.lo[4 + k] = std::min(box.lo[k], box.lo[4 + k]);
+      box.hi[k] = box.hi[4 + k] = std::max(box.hi[k], box.hi[4 + k]);
+    }
+    state.motion = state.placed.data();
+    state.box = box;
+    state.fitted = state.fitted_to_map = false;
+  }
+}
+
+/// The tree's boxes of this stretch. False: of such a size that nothing is computed with them.
+bool ClearanceFinder::fit(std::size_t b, const ClearancePart& stretch, bool to_map) {
   BodyState& state = bodies_[b];
-  const SceneBody& body = part.scene.bodies()[b];
-  const Body& motion = part.step.bodies[b];
+  const SceneBody& body = stretch.scene.bodies()[b];
+  const Body& motion = stretch.step.bodies[b];
   if (state.tree.empty()) return false;
   if (to_map && !state.fitted_to_map) {
-    const Positions& t0 = inMapFrame(part.step.map.map_from_fixed, *motion.t0, state.map_t0);
-    const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *motion.t1, state.map_t1);
+    const Positions& t0 = inMapFrame(stretch.step.map.map_from_fixed, *motion.t0, state.map_t0);
+    const Positions& t1 = inMapFrame(stretch.step.map.map_from_fixed, *motion.t1, state.map_t1);
     state.on_map.resize(body.usedCount());
     for (std::size_t i = 0; i < body.usedCount(); ++i) {
       const Vec3 &p = t0[body.slot_vertex[i]], &q = t1[body.slot_vertex[i]];
@@ -94,7 +122,7 @@ bool ClearanceFinder::fit(std::size_t b, const ClearancePart& part, bool to_map)
     }
     state.tree.refit(state.on_map.data());
   } else if (!to_map && !state.fitted) {
-    state.tree.refit(part.scene.vertices() + body.internal_begin);
+    state.tree.refit(state.motion);
   }
   state.fitted = !to_map;
   state.fitted_to_map = to_map;
@@ -102,16 +130,34 @@ bool ClearanceFinder::fit(std::size_t b, const ClearancePart& part, bool to_map)
 }
 
 void ClearanceFinder::addPart(const ClearancePart& part) {
+  stretches_ = (needed_ + part.count - 1) / part.count;
   learnBodies(part);
   if (rows_.size() < pairs_) addRowsOfNear(part);
   takeContacts(part);
+  if (stretches_ == 1) {
+    searchRows(part);
+  } else {
+    Step at = *step_;
+    for (Body& body : at.bodies) body.t1 = body.t0;
+    const std::size_t count = part.count * stretches_;
+    for (std::size_t i = part.index * stretches_; i < (part.index + 1) * stretches_; ++i) {
+      if (i > 0 && i == part.index * stretches_) advance(*step_, i, count, at);
+      advance(*step_, i + 1, count, at);
+      const ClearancePart stretch{at, i, count, part.scene, part.map, part.found, part.deadline};
+      place(stretch);
+      searchRows(stretch);
+    }
+  }
+  came_ += stretches_;
+}
+
+void ClearanceFinder::searchRows(const ClearancePart& stretch) {
   // The map's rows last: they may want the boxes of another frame.
   for (const bool maps : {false, true}) {
     for (Row& row : rows_) {
-      if ((row.answer.body[1] == OBSTACLE_BODY) == maps) search(row, part);
+      if ((row.answer.body[1] == OBSTACLE_BODY) == maps) search(row, stretch);
     }
   }
-  ++parts_;
 }
 
 /// What of it lies in the whole step.
@@ -188,65 +234,81 @@ void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<st
 
 /// Whether nothing is to be searched: nothing can be known of the two, boxes or the steps before show that they are
 /// far, or there is no time.
-bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& part, double limit_m) {
+bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& stretch, double limit_m) {
   const auto [a, b] = row.answer.body;
-  const bool on_map = b == OBSTACLE_BODY, empty = on_map && part.map && part.map->leafCount() == 0;
-  const bool known = on_map ? part.map && (empty || isUsable(boxOfMap(*part.map))) : bodies_[b].known;
+  const bool on_map = b == OBSTACLE_BODY, empty = on_map && stretch.map && stretch.map->leafCount() == 0;
+  const bool known = on_map ? stretch.map && (empty || isUsable(boxOfMap(*stretch.map))) : bodies_[b].known;
   row.unknown = row.unknown || !bodies_[a].known || !known;
   if (row.unknown) return true;
-  ++row.parts;
+  ++row.stretches;
   FoundDistance apart;
   apart.lower_m = 0;
   if (empty) {
     apart.lower_m = std::numeric_limits<double>::infinity();
   } else if (a == b) {
-    apart.lower_m = isStillFar(a, part, limit_m) ? limit_m : 0;
-  } else if (!on_map || isIdentity(part.step.map.map_from_fixed)) {
-    apart.lower_m =
-        apartByBoxes(boxOf(part.scene.bodies()[a]), on_map ? boxOfMap(*part.map) : boxOf(part.scene.bodies()[b]));
+    apart.lower_m = isStillFar(a, stretch, limit_m) ? limit_m : 0;
+  } else if (!on_map || isIdentity(stretch.step.map.map_from_fixed)) {
+    apart.lower_m = apartByBoxes(bodies_[a].box, on_map ? boxOfMap(*stretch.map) : bodies_[b].box);
   }
   const bool is_far = apart.lower_m >= limit_m;
-  if (!is_far && !part.deadline.isOver()) return false;
+  if (!is_far && !stretch.deadline.isOver()) return false;
   apart.cut = !is_far;
-  row.over_step.lower_m = std::min(row.over_step.lower_m, apart.lower_m);
+  row.over_step.lower_m = std::min(row.over_step.lower_m, std::max(0.0, apart.lower_m - leavesArcsBy(row)));
   row.over_step.cut = row.over_step.cut || apart.cut;
-  if (part.index + 1 == part.count) row.at_end = apart;
+  if (stretch.index + 1 == stretch.count) row.at_end = apart;
   return true;
 }
 
-void ClearanceFinder::search(Row& row, const ClearancePart& part) {
+void ClearanceFinder::search(Row& row, const ClearancePart& stretch) {
   const auto [a, b] = row.answer.body;
-  const bool on_map = b == OBSTACLE_BODY, last = part.index + 1 == part.count;
-  const double limit_m = limitOf(row) + radiusOf(row);
-  if (needsNoSearch(row, part, limit_m)) return;
-  const bool moved = on_map && !isIdentity(part.step.map.map_from_fixed);
-  if (!fit(a, part, moved) || (!on_map && a != b && !fit(b, part, false))) {
+  const bool on_map = b == OBSTACLE_BODY, last = stretch.index + 1 == stretch.count;
+  const double limit_m = limitOverStep(row);
+  if (needsNoSearch(row, stretch, limit_m)) return;
+  const bool moved = on_map && !isIdentity(stretch.step.map.map_from_fixed);
+  if (!fit(a, stretch, moved) || (!on_map && a != b && !fit(b, stretch, false))) {
     row.unknown = true;
     return;
   }
-  NearestSearch::Goal goal{options_.tolerance_m, limit_m, false, part.deadline};
+  NearestSearch::Goal goal{options_.tolerance_m, limit_m, false, stretch.deadline};
+  std::array<std::uint32_t, 2> nearest{};
   FoundDistance at_end;
   if (!(row.touches && exact_)) {  // else all is known of the step
     if (a == b) goal.limit_m *= tolerance::CLEARANCE_SELF_REACH;
-    const FoundDistance found = measure(row, part, goal, row.over_step);
-    goal.limit_m = limit_m;
-    if (found.upper_m < row.over_step.upper_m) {
-      if (!row.touches) describe(row, part, found, row.answer.over_step);
+    const FoundDistance found = measure(row, stretch, goal, row.over_step);
+    if (a == b) keepFar(a, stretch, found);
+    if (takeOverStep(row, stretch, found)) {
+      nearest = found.item;
+      goal.first = &nearest;
       if (found.t == 1) at_end = found;
     }
-    row.over_step.upper_m = found.upper_m;
-    row.over_step.lower_m = std::min(row.over_step.lower_m, found.lower_m);
-    row.over_step.cut = row.over_step.cut || found.cut;
-    if (a == b) keepFar(a, part, found);
     if (last && found.lower_m >= limit_m) {
       row.at_end.lower_m = found.lower_m;
       return;
     }
   }
   if (!last) return;
+  goal.limit_m = limitOf(row) + radiusOf(row);
+  if (at_end.lower_m > 0 && at_end.upper_m < goal.limit_m) {  // the step's least is at its end, and they do not meet
+    row.at_end = at_end;
+    describe(row, stretch, row.at_end, row.answer.at_end);
+    return;
+  }
   goal.at_end = true;
-  row.at_end = measure(row, part, goal, at_end);
-  describe(row, part, row.at_end, row.answer.at_end);
+  row.at_end = measure(row, stretch, goal, at_end);
+  describe(row, stretch, row.at_end, row.answer.at_end);
+}
+
+/// What was found on straight paths becomes what is known of the true ones, which meet them at a stretch's ends.
+/// Whether it is the least of the step so far.
+bool ClearanceFinder::takeOverStep(Row& row, const ClearancePart& stretch, const FoundDistance& found) {
+  const double leaves_m = leavesArcsBy(row);
+  const double upper_m = found.t > 0 && found.t < 1 ? found.upper_m + leaves_m : found.upper_m;
+  const bool is_least = upper_m < row.over_step.upper_m;
+  if (is_least && !row.touches) describe(row, stretch, found, row.answer.over_step);
+  row.over_step.upper_m = std::min(row.over_step.upper_m, upper_m);
+  row.over_step.lower_m = std::min(row.over_step.lower_m, std::max(0.0, found.lower_m - leaves_m));
+  row.over_step.cut = row.over_step.cut || found.cut;
+  return is_least;
 }
 
 /// A body that is far enough from itself stays so while no vertex has moved by more than half of what there is to
@@ -256,7 +318,7 @@ bool ClearanceFinder::isStillFar(std::size_t b, const ClearancePart& part, doubl
   const SceneBody& body = part.scene.bodies()[b];
   if (state.far_at.size() != body.usedCount() || !(state.far_m > limit_m) || state.self_m != options_.self_m)
     return false;
-  const VertexMotion* now = part.scene.vertices() + body.internal_begin;
+  const VertexMotion* now = state.motion;
   double largest = 0, moved_squared = 0;
   for (int end = 0; end < 2; ++end) {
     const auto at = [&](std::size_t i) {
@@ -269,7 +331,7 @@ bool ClearanceFinder::isStillFar(std::size_t b, const ClearancePart& part, doubl
       moved_squared = std::max(moved_squared, (at(i) - state.far_at[i] - common).squaredNorm());
     }
   }
-  for (int k = 0; k < 3; ++k) largest = std::max({largest, std::abs(body.bounds_min[k]), std::abs(body.bounds_max[k])});
+  for (int k = 0; k < 3; ++k) largest = std::max({largest, std::abs(state.box.lo[k]), std::abs(state.box.hi[k])});
   const double spare_m = state.far_m - limit_m - 2 * options_.tolerance_m - tolerance::CLEARANCE * largest;
   return spare_m > 0 && 4 * moved_squared < spare_m * spare_m;
 }
@@ -277,7 +339,7 @@ bool ClearanceFinder::isStillFar(std::size_t b, const ClearancePart& part, doubl
 void ClearanceFinder::keepFar(std::size_t b, const ClearancePart& part, const FoundDistance& found) {
   BodyState& state = bodies_[b];
   const SceneBody& body = part.scene.bodies()[b];
-  const VertexMotion* now = part.scene.vertices() + body.internal_begin;
+  const VertexMotion* now = state.motion;
   state.far_m = found.lower_m;
   state.far_at.clear();
   if (!(found.lower_m > limitOf(*rowOf(b, b)))) return;

@@ -16,7 +16,8 @@
 
 namespace dccd {
 
-/// What one part of a step gives the finder.
+/// What one part of a step gives the finder. Where bodies turn, distances may need more parts than contacts do: what is
+/// searched at a time is a stretch, a part or an equal share of one, with the same findings.
 struct ClearancePart {
   const Step& step;
   std::size_t index, count;
@@ -46,6 +47,10 @@ class DCCD_HIDDEN ClearanceFinder {
 
  private:
   struct BodyState {
+    const VertexMotion* motion = nullptr;  // of the stretch, by slots
+    StepBox box;                           // of that
+    std::vector<VertexMotion> placed;      // the same, where the stretch is less than a part
+    double leaves_arc_m = 0;               // how far its straight paths do at most
     FeatureTree tree;
     SurfaceNeighbours neighbours;
     double self_m = 0;                          // of the neighbours; 0: they are not known
@@ -53,7 +58,7 @@ class DCCD_HIDDEN ClearanceFinder {
     Positions far_at;                           // by slots, where it was when it was known to be far_m from itself
     double far_m = 0;
     bool known = false;                          // in this part: it has features, and all of them have bounds
-    bool fitted = false, fitted_to_map = false;  // the tree's boxes are of this part
+    bool fitted = false, fitted_to_map = false;  // the tree's boxes are of this stretch
     double radius_m = 0;                         // the largest
     Positions map_t0, map_t1;                    // this part's, in the frame of the map
     std::vector<VertexMotion> on_map;            // the same, by slots
@@ -63,14 +68,11 @@ class DCCD_HIDDEN ClearanceFinder {
     bool unknown = false;                     // something of the two was never looked at
     bool touches = false, undecided = false;  // the step has such a contact
     FoundDistance at_end, over_step;
-    std::size_t parts = 0;  // that it was looked for in
+    std::size_t stretches = 0;  // that it was looked for in
   };
 
   /// In row_of_, beside the numbers of rows.
   enum : std::int32_t { NOT_ASKED = -1, ROWLESS = -2 };
-
-  /// Of the whole part. Empty bodies: nothing is in it.
-  static StepBox boxOf(const SceneBody& body) { return StepBox::still(body.bounds_min, body.bounds_max); }
 
   // clearance_rows.cpp
   std::int32_t& placeOf(std::size_t a, std::size_t b);
@@ -80,8 +82,10 @@ class DCCD_HIDDEN ClearanceFinder {
   void addRowsOfNear(const ClearancePart& part);
   double limitOf(const Row& row) const;
   double radiusOf(const Row& row) const;
-  void conclude(Row& row, std::size_t parts) const;
-  void judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const;
+  double leavesArcsBy(const Row& row) const;
+  double limitOverStep(const Row& row) const;
+  void conclude(Row& row, std::size_t stretches) const;
+  void judge(const Row& row, const FoundDistance& found, double wider_m, ClearanceDistance& distance) const;
 
   // clearance_finder.cpp
   void learn(const Body& body, const SceneBody& scene_body, BodyState& state) const;
@@ -89,9 +93,12 @@ class DCCD_HIDDEN ClearanceFinder {
   void touchAt(const ClearancePart& part, double t, std::array<std::uint16_t, 2> body,
                std::array<FeatureTree::Feature, 2> vertex, const OccupiedLeaf* leaf);
   void learnBodies(const ClearancePart& part);
-  bool fit(std::size_t body, const ClearancePart& part, bool to_map);
-  bool needsNoSearch(Row& row, const ClearancePart& part, double limit_m);
-  void search(Row& row, const ClearancePart& part);
+  void place(const ClearancePart& stretch);
+  bool fit(std::size_t body, const ClearancePart& stretch, bool to_map);
+  bool needsNoSearch(Row& row, const ClearancePart& stretch, double limit_m);
+  void searchRows(const ClearancePart& stretch);
+  void search(Row& row, const ClearancePart& stretch);
+  bool takeOverStep(Row& row, const ClearancePart& stretch, const FoundDistance& found);
   bool isStillFar(std::size_t body, const ClearancePart& part, double limit_m) const;
   void keepFar(std::size_t body, const ClearancePart& part, const FoundDistance& found);
   FoundDistance measure(const Row& row, const ClearancePart& part, const NearestSearch::Goal& goal,
@@ -99,13 +106,17 @@ class DCCD_HIDDEN ClearanceFinder {
   void describe(const Row& row, const ClearancePart& part, const FoundDistance& found,
                 ClearanceDistance& distance) const;
 
+  const Step* step_ = nullptr;  // all of it, while it is computed
   ClearanceOptions options_;
-  bool exact_ = true;  // a contact is a touch, not a distance
+  double rigid_tolerance_m_ = 0;
+  std::size_t needed_ = 1;     // stretches of the step in which what turns goes straight enough
+  std::size_t stretches_ = 1;  // of each part
+  bool exact_ = true;          // a contact is a touch, not a distance
   std::vector<Expectation> expected_;
   std::vector<BodyState> bodies_;
   std::vector<Row> rows_;
-  std::vector<std::int32_t> row_of_;   // [a * (bodies + 1) + b], b = bodies: the map
-  std::size_t pairs_ = 0, parts_ = 0;  // that are asked for; that came
+  std::vector<std::int32_t> row_of_;  // [a * (bodies + 1) + b], b = bodies: the map
+  std::size_t pairs_ = 0, came_ = 0;  // pairs that are asked for; stretches that came
   MapBoxes map_;
   NearestSearch search_;
 };

@@ -4,6 +4,7 @@
 
 #include "step/clearance/clearance_finder.h"
 #include "step/conclude.h"
+#include "step/parts.h"
 
 namespace dccd {
 namespace {
@@ -16,16 +17,25 @@ bool expectsAll(const std::vector<Expectation>& expected, std::uint16_t a, std::
   });
 }
 
+/// A limit that holds when leaves_m is taken off, as both are rounded.
+double limitBefore(double limit_m, double leaves_m) {
+  return leaves_m > 0 ? (limit_m + leaves_m) * (1 + tolerance::CLEARANCE_BOX) : limit_m;
+}
+
 }  // namespace
 
 void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Options& options) {
+  step_ = &step;
   options_ = options.clearance;
+  rigid_tolerance_m_ = options.rigid_tolerance_m;
+  needed_ = std::min(neededParts(step, rigid_tolerance_m_, scene.bodies(), options_.max_m), options.max_substeps);
+  stretches_ = 1;
   exact_ = options.accuracy.rung == Accuracy::EXACT;
   const std::size_t n = step.bodies.size();
   bodies_.resize(n);
   rows_.clear();
   row_of_.assign(n * (n + 1), NOT_ASKED);
-  pairs_ = parts_ = 0;
+  pairs_ = came_ = 0;
   expected_ = options.expected;
   for (std::size_t b = 0; b < n; ++b) learn(step.bodies[b], scene.bodies()[b], bodies_[b]);
   const auto ask = [&](std::size_t a, std::size_t b) {
@@ -62,8 +72,8 @@ ClearanceFinder::Row ClearanceFinder::newRow(std::size_t a, std::size_t b) const
   row.answer.body = {static_cast<std::uint16_t>(a),
                      b == bodies_.size() ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
   row.answer.expected = expectsAll(expected_, row.answer.body[0], row.answer.body[1]);
-  row.parts = parts_;
-  if (parts_ > 0) row.at_end.lower_m = row.over_step.lower_m = limitOf(row) + radiusOf(row);
+  row.stretches = came_;
+  if (came_ > 0) row.at_end.lower_m = row.over_step.lower_m = limitOf(row) + radiusOf(row);
   return row;
 }
 
@@ -75,14 +85,14 @@ ClearanceFinder::Row& ClearanceFinder::addRow(std::size_t a, std::size_t b) {
 
 /// Of two bodies that boxes do not show to be far, of which nothing is known, or that have a contact.
 void ClearanceFinder::addRowsOfNear(const ClearancePart& part) {
-  std::vector<StepBox> boxes;
-  for (const SceneBody& body : part.scene.bodies()) boxes.push_back(boxOf(body));
-  for (std::size_t a = 0; a < boxes.size(); ++a) {
-    for (std::size_t b = a + 1; b < boxes.size(); ++b) {
+  for (std::size_t a = 0; a < bodies_.size(); ++a) {
+    for (std::size_t b = a + 1; b < bodies_.size(); ++b) {
       if (placeOf(a, b) != ROWLESS) continue;
-      const double limit_m = options_.max_m + bodies_[a].radius_m + bodies_[b].radius_m;
-      const bool known = bodies_[a].known && bodies_[b].known;
-      if (!known || !(apartByBoxes(boxes[a], boxes[b]) >= limit_m)) addRow(a, b);
+      const BodyState &first = bodies_[a], &second = bodies_[b];
+      const double limit_m = options_.max_m + first.radius_m + second.radius_m;
+      const double leaves_m = first.leaves_arc_m + second.leaves_arc_m;
+      const bool known = first.known && second.known;
+      if (!known || !(apartByBoxes(first.box, second.box) >= limitBefore(limit_m, leaves_m))) addRow(a, b);
     }
   }
   const auto addRowOf = [&](const std::array<std::uint16_t, 2>& body) {
@@ -108,7 +118,20 @@ double ClearanceFinder::radiusOf(const Row& row) const {
   return bodies_[a].radius_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].radius_m);
 }
 
-void ClearanceFinder::judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const {
+/// How far the straight paths of the two may be from their arcs, together.
+double ClearanceFinder::leavesArcsBy(const Row& row) const {
+  const auto [a, b] = row.answer.body;
+  return bodies_[a].leaves_arc_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].leaves_arc_m);
+}
+
+/// From where on they are FARTHER on their straight paths.
+double ClearanceFinder::limitOverStep(const Row& row) const {
+  return limitBefore(limitOf(row) + radiusOf(row), leavesArcsBy(row));
+}
+
+/// wider_m: by how much more than is asked for the bounds may be apart.
+void ClearanceFinder::judge(const Row& row, const FoundDistance& found, double wider_m,
+                            ClearanceDistance& distance) const {
   const double limit_m = limitOf(row), radius_m = radiusOf(row);
   if (found.lower_m >= limit_m + radius_m) {
     distance = ClearanceDistance();
@@ -116,7 +139,7 @@ void ClearanceFinder::judge(const Row& row, const FoundDistance& found, Clearanc
     distance.lower_m = limit_m;
     return;
   }
-  const double wide_m = std::max(options_.tolerance_m, tolerance::CLEARANCE_RELATIVE * found.upper_m);
+  const double wide_m = std::max(options_.tolerance_m, tolerance::CLEARANCE_RELATIVE * found.upper_m) + wider_m;
   distance.status = found.upper_m == 0                                        ? ClearanceStatus::TOUCHING
                     : found.cut || !(found.upper_m - found.lower_m <= wide_m) ? ClearanceStatus::LOWER
                                                                               : ClearanceStatus::MEASURED;
@@ -125,13 +148,13 @@ void ClearanceFinder::judge(const Row& row, const FoundDistance& found, Clearanc
   distance.upper_m = found.upper_m;
 }
 
-void ClearanceFinder::conclude(Row& row, std::size_t parts) const {
+void ClearanceFinder::conclude(Row& row, std::size_t stretches) const {
   Clearance& answer = row.answer;
-  if (row.parts < parts) {  // what was not come to may be anything
+  if (row.stretches < stretches) {  // what was not come to may be anything
     row.over_step.lower_m = row.at_end.lower_m = 0;
     row.over_step.cut = row.at_end.cut = true;
   }
-  if (!row.unknown) judge(row, row.at_end, answer.at_end);
+  if (!row.unknown) judge(row, row.at_end, 0, answer.at_end);
   if (row.touches) {
     const double upper_m = exact_ || row.unknown ? 0 : row.over_step.upper_m;
     answer.over_step.status = ClearanceStatus::TOUCHING;
@@ -142,7 +165,8 @@ void ClearanceFinder::conclude(Row& row, std::size_t parts) const {
   } else if (answer.at_end.status == ClearanceStatus::TOUCHING) {
     answer.over_step = answer.at_end;
   } else {
-    judge(row, row.over_step, answer.over_step);
+    // Beyond what the tolerance of arcs allows they are only bounds.
+    judge(row, row.over_step, 2 * std::min(leavesArcsBy(row), 2 * rigid_tolerance_m_), answer.over_step);
   }
 }
 
@@ -166,7 +190,7 @@ void ClearanceFinder::finish(std::size_t parts, Outcome& outcome) {
       Row none;
       if (place == ROWLESS) none = newRow(a, b);
       Row& row = place == ROWLESS ? none : rows_[static_cast<std::size_t>(place)];
-      conclude(row, parts);
+      conclude(row, parts * stretches_);
       const ClearanceStatus status = row.answer.over_step.status;
       stats.out += status != ClearanceStatus::LOWER && status != ClearanceStatus::UNKNOWN;
       const bool stands_for_others = status == ClearanceStatus::FARTHER && a != b && !row.answer.expected;

@@ -1,6 +1,7 @@
 #include "step/clearance/feature_tree.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace dccd {
 
@@ -61,6 +62,7 @@ void FeatureTree::build(const SceneBody& body, const Positions& positions) {
           leaf_slots_.push_back(slot);
       }
     }
+    node.vertices_end = static_cast<std::uint32_t>(leaf_slots_.size());
   }
   boxes_.resize(nodes_.size());
   built_ = true;
@@ -98,6 +100,21 @@ StepBox FeatureTree::itemBox(std::uint32_t feature) const {
   return box;
 }
 
+double FeatureTree::leafReach(std::uint32_t leaf, const Vec3& direction, bool at_end) const {
+  double reach_m = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = nodes_[leaf].vertices; i < nodes_[leaf].vertices_end; ++i)
+    reach_m = std::max(reach_m, reachOf(leaf_slots_[i], direction, at_end));
+  return reach_m;
+}
+
+double FeatureTree::itemReach(std::uint32_t feature, const Vec3& direction, bool at_end) const {
+  double reach_m = -std::numeric_limits<double>::infinity();
+  for (const Index slot : slots_[feature]) {
+    if (slot != NO_INDEX) reach_m = std::max(reach_m, reachOf(slot, direction, at_end));
+  }
+  return reach_m;
+}
+
 MovingHull FeatureTree::itemHull(std::uint32_t feature) const {
   MovingHull hull;
   for (const Index slot : slots_[feature]) {
@@ -110,13 +127,11 @@ MovingHull FeatureTree::itemHull(std::uint32_t feature) const {
 
 void FeatureTree::refit(const VertexMotion* vertices) {
   vertices_ = vertices;
-  std::size_t slots_end = leaf_slots_.size();
   for (std::size_t n = nodes_.size(); n-- > 0;) {  // children come after their parents
     const Node& node = nodes_[n];
     if (node.right == 0) {
       StepBox box = StepBox::none();
-      for (std::size_t i = node.vertices; i < slots_end; ++i) box.add(vertices[leaf_slots_[i]]);
-      slots_end = node.vertices;
+      for (std::size_t i = node.vertices; i < node.vertices_end; ++i) box.add(vertices[leaf_slots_[i]]);
       boxes_[n] = box;
     } else {
       boxes_[n] = boxes_[n + 1];

@@ -41,6 +41,9 @@ class FeatureTree {
   }
   const std::vector<Feature>& features() const { return features_; }
   StepBox itemBox(std::uint32_t feature) const;
+  /// How far it reaches along a direction in the step, or at its end alone.
+  double leafReach(std::uint32_t leaf, const Vec3& direction, bool at_end) const;
+  double itemReach(std::uint32_t feature, const Vec3& direction, bool at_end) const;
   MovingHull itemHull(std::uint32_t feature) const;
 
  private:
@@ -48,6 +51,7 @@ class FeatureTree {
     std::uint32_t first = 0, count = 0;  // of the features
     std::uint32_t right = 0;             // the second child; the first one is the next node. 0: a leaf
     std::uint32_t vertices = 0;          // of a leaf, where its slots begin
+    std::uint32_t vertices_end = 0;
   };
   std::uint32_t addNode(std::vector<std::uint32_t>& order, const std::vector<Vec3>& centres, std::uint32_t first,
                         std::uint32_t last);
@@ -56,7 +60,14 @@ class FeatureTree {
   std::vector<Feature> features_;
   std::vector<Feature> slots_;  // the same by slots
   std::vector<Node> nodes_;
-  std::vector<Index> leaf_slots_;  // of each leaf, once each; then where they end
+  double reachOf(Index slot, const Vec3& direction, bool at_end) const {
+    const VertexMotion& v = vertices_[slot];
+    const double end = direction[0] * v.t1[0] + direction[1] * v.t1[1] + direction[2] * v.t1[2];
+    if (at_end) return end;
+    return std::max(end, direction[0] * v.t0[0] + direction[1] * v.t0[1] + direction[2] * v.t0[2]);
+  }
+
+  std::vector<Index> leaf_slots_;  // of each leaf, once each
   std::vector<StepBox> boxes_;
   const VertexMotion* vertices_ = nullptr;
 };

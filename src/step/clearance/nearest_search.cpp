@@ -21,7 +21,8 @@ void NearestSearch::begin(const Goal& goal, const FoundDistance& known) {
   found_.lower_m = settled_squared_ = std::numeric_limits<double>::infinity();
   found_.cut = false;
   looks_ = 0;
-  number_ = 0;
+  number_ = 1;
+  direction_from_ = 0;
   touching_.clear();
   heap_.clear();
   setEnough();
@@ -55,8 +56,24 @@ Nearest NearestSearch::takeAt(double t) {
     for (int side = 0; side < 2; ++side) found_.point[side] = pair_.pointInMetres(nearest.point[side]);
     found_.item = item_;
     setEnough();
+    if (nearest.direction != Vec3::Zero()) {
+      direction_ = nearest.direction;
+      direction_from_ = number_;
+      ++directions_;
+    }
   }
   return nearest;
+}
+
+/// The pair meets at the end.
+void NearestSearch::takeMeeting() {
+  const Nearest nearest = pair_.at(1, goal_.tolerance_m / 4);
+  for (int side = 0; side < 2; ++side) found_.point[side] = pair_.pointInMetres(nearest.point[side]);
+  found_.t = 1;
+  found_.item = item_;
+  found_.upper_m = 0;
+  setEnough();
+  settle(0);
 }
 
 /// Of the pair over the whole step. The directions at an interval's ends bound the distance over it, and err by the

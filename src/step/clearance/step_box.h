@@ -8,6 +8,7 @@
 
 #include "dccd/elementary.h"
 #include "dccd/tolerances.h"
+#include "dccd/types.h"
 
 namespace dccd {
 
@@ -45,6 +46,25 @@ struct StepBox {
       lo[k] = std::min(lo[k], other.lo[k]);
       hi[k] = std::max(hi[k], other.hi[k]);
     }
+  }
+  /// The largest coordinate, whatever its sign.
+  double largest() const {
+    double largest = 0;
+    for (int k = 0; k < 8; ++k) largest = std::max({largest, std::abs(lo[k]), std::abs(hi[k])});
+    return largest;
+  }
+  /// How far its corners reach along a direction in the step, or at its end alone.
+  double reach(const Vec3& direction, bool at_end) const {
+    double reach[2] = {0, 0};
+    for (int k = 0; k < 8; ++k) {
+      if (k % 4 < 3) reach[k / 4] += direction[k % 4] * (direction[k % 4] > 0 ? hi[k] : lo[k]);
+    }
+    return at_end ? reach[1] : std::max(reach[0], reach[1]);
+  }
+  /// Of its way through the step, or at its end alone.
+  Vec3 middle(bool at_end) const {
+    const Vec3 end(lo[4] + hi[4], lo[5] + hi[5], lo[6] + hi[6]);
+    return at_end ? Vec3(end / 2) : Vec3((end + Vec3(lo[0] + hi[0], lo[1] + hi[1], lo[2] + hi[2])) / 4);
   }
   double length() const { return std::max({hi[4] - lo[4], hi[5] - lo[5], hi[6] - lo[6]}); }
 };

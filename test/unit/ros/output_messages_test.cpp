@@ -245,7 +245,7 @@ TEST(State, ReasonIsEnoughByItself) {
   outcome.patches = {first, second};
   outcome.touching = Touching::LASTING;
   EXPECT_EQ(reasonOf(""),
-            "proved, what touches did so when the step began: cloth and itself for 2.07 s, 2 patches, the largest at "
+            "proved, what touches lasts: cloth and itself for 2.07 s, 2 patches, the largest at "
             "0.300 0.100 0.750; nothing was checked against a map");
   outcome.patches = {second};
   outcome.patches[0].beginning = PatchBeginning::INITIAL;
@@ -253,7 +253,7 @@ TEST(State, ReasonIsEnoughByItself) {
   outcome.unproved = {"no octomap has been received yet; checked without it"};
   EXPECT_EQ(
       reasonOf("the map has new voxels"),
-      "not proved: no octomap has been received yet; checked without it; what touches did so when the step began: "
+      "not proved: no octomap has been received yet; checked without it; what touches lasts: "
       "cloth and itself since the first look, 1 patch at 0.300 0.100 0.750; see rostopic hz /octomap, or do without "
       "with effects/octomap: off; the promise of ~safe_until was void: the map has new voxels");
 }

@@ -264,6 +264,48 @@ TEST(Clearance, OfATurningBodyIsAlongThePathThatIsTested) {
   EXPECT_GT(row.at_end.lower_m, 0.8);
 }
 
+// A rod of half a metre turns at 3 rad/s, with a frame each fifth of a second: its contacts need no part of the step,
+// since it is far by its bounds, and its chord passes the post at 52 mm where the rod itself does at 30 mm.
+TEST(Clearance, OfATurningBodyThatIsFarByItsBoundsIsThatOfItsArc) {
+  const auto rodAt = [](double angle) { return Eigen::Isometry3d(Eigen::AngleAxisd(angle, Vec3::UnitZ())); };
+  const auto passing = [&](double angle, double post_m) {
+    const Positions rod{{0, 0, 0}, {0.5, 0, 0}, {0.5, 0, 0.01}};
+    Body turning = bodyOf("rod", TRIANGLE);
+    turning.rigid = turning.turns = true;
+    turning.pose_t0 = rodAt(-angle / 2);
+    turning.pose_t1 = rodAt(angle / 2);
+    Positions from, to;
+    for (const Vec3& p : rod) {
+      from.push_back(turning.pose_t0 * p);
+      to.push_back(turning.pose_t1 * p);
+    }
+    Step step = stepOf(turning, from, to);
+    step.bodies.push_back(
+        moving(bodyOf("post", TRIANGLE), movedBy(FLAT, {post_m, 0, 0}), movedBy(FLAT, {post_m, 0, 0})));
+    return step;
+  };
+  for (const double angle : {0.6, 1.2}) {  // the latter: 12 rad/s at 10 Hz
+    const Outcome outcome = Detector(asking()).run(passing(angle, 0.53));
+    ASSERT_EQ(outcome.substeps, 1u) << "else it shows nothing";
+    const ClearanceDistance over_step = rowOf(outcome.clearances, 0, 1).over_step;
+    EXPECT_EQ(over_step.status, ClearanceStatus::MEASURED);
+    EXPECT_LE(over_step.lower_m, 0.03);
+    EXPECT_GE(over_step.upper_m, 0.03);
+    EXPECT_LE(over_step.upper_m - over_step.lower_m, 1e-4 + 4 * Options().rigid_tolerance_m);
+    EXPECT_NEAR(over_step.t, 0.5, 0.2);
+    EXPECT_GT(rowOf(outcome.clearances, 0, 1).at_end.lower_m, over_step.upper_m);
+  }
+  // Where parts are not allowed it is only a bound, and FARTHER holds on the arc, too.
+  Options one_part = asking();
+  one_part.max_substeps = 1;
+  const ClearanceDistance bound = rowOf(distance(passing(0.6, 0.53), one_part), 0, 1).over_step;
+  EXPECT_EQ(bound.status, ClearanceStatus::LOWER);
+  EXPECT_LE(bound.lower_m, 0.03);
+  EXPECT_GE(bound.upper_m, 0.03);
+  EXPECT_EQ(rowOf(distance(passing(0.6, 0.53), asking(0.04)), 0, 1).over_step.status, ClearanceStatus::MEASURED);
+  EXPECT_EQ(rowOf(distance(passing(0.6, 0.53), asking(0.02)), 0, 1).over_step.status, ClearanceStatus::FARTHER);
+}
+
 TEST(Clearance, NamesWhatIsExpected) {
   Options options = asking();
   options.expected.push_back({{ExpectedPartner{1, {}, ""}, ExpectedPartner{0, {}, ""}}, ""});

@@ -52,6 +52,32 @@ TEST(NewContacts, APatchIsNewsOnceAndThenLasts) {
   for (int k = 2; k < 8; ++k) EXPECT_EQ(said[static_cast<std::size_t>(k)], Touching::LASTING) << k;
 }
 
+// One rule: NEW is an alarm. What comes back within patch_gap_s is the same patch, and lasts, though the step starts
+// CLEAR and its contact is not initial.
+TEST(NewContacts, WhatComesBackWithinTheGapLastsThoughItsStepStartsClear) {
+  ClothOnTable stream(5, 5);
+  std::vector<Touching> said;
+  const auto to = [&](double z) {
+    const Outcome outcome = stream.at(z);
+    said.push_back(assuranceOf(outcome).touching);
+    EXPECT_EQ(said.back() == Touching::NEW, !newContacts(outcome).empty());
+    return outcome;
+  };
+  for (const double z : {0.01, 0.0, 0.01, 0.01}) to(z);
+  const Outcome back = to(0);
+  EXPECT_EQ(back.start_state, StartState::CLEAR);
+  EXPECT_EQ(back.counts.initial, 0u);
+  EXPECT_GT(back.counts.certain, 0u);
+  EXPECT_EQ(back.touching, Touching::NEW) << "as if no patches were tracked";
+  for (int k = 0; k < 12; ++k) to(0.01);
+  to(0);
+  std::vector<Touching> expected{Touching::NONE, Touching::NEW,     Touching::LASTING,
+                                 Touching::NONE, Touching::LASTING, Touching::LASTING};
+  expected.resize(17, Touching::NONE);
+  expected.push_back(Touching::NEW);
+  EXPECT_EQ(said, expected);
+}
+
 TEST(NewContacts, OfAPatchThatIsNewByEdgesThatCrossAnExpectedContactIsNone) {
   Outcome outcome;
   outcome.tracked = true;
