@@ -587,6 +587,17 @@ TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {
   EXPECT_EQ(other.status, StepStatus::NO_MAP);
   EXPECT_NE(other.reason.find("octomap_file of 0.1 m"), std::string::npos) << other.reason;
 
+  const double as_float = static_cast<double>(0.1f);
+  monitor_->setMap(mapOf(as_float, leavesOf(slab(1)), 350 * MS));
+  const Outcome both = feed(400 * MS, 0.55);
+  ASSERT_TRUE(both.obstacle) << both.reason;
+  EXPECT_EQ(both.obstacle->resolution(), as_float) << "the live map's";
+  EXPECT_NE(both.obstacle->leafAt({0.45, 0.45, 0.45}), nullptr);
+  monitor_->setMap(mapOf(VOXEL_M * (1 + 2e-7), leavesOf(slab(1)), 450 * MS));
+  const Outcome apart = feed(500 * MS, 0.55);
+  EXPECT_EQ(apart.status, StepStatus::NO_MAP);
+  EXPECT_NE(apart.reason.find("voxels of 0.10000002 m"), std::string::npos) << apart.reason;
+
   start(0.05);
   feed(0, 0.545);
   table.trusted = true;
