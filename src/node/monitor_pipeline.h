@@ -116,6 +116,10 @@ class MonitorPipeline {
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
+  /// Of the body's topic: messages of markers that are none of the mesh.
+  std::uint64_t passedOver(std::size_t body) const { return passed_over_[body].messages; }
+  /// That nothing else came, and what did; empty: something else did, or nothing at all.
+  std::string onlyPassedOver(std::size_t body) const;
   /// What was taken for granted to place the map, since the last call; for the log. Empty: nothing was.
   std::string takeMapNote() { return std::exchange(map_note_, {}); }
   /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h); empty: nothing
@@ -186,6 +190,11 @@ class MonitorPipeline {
   std::optional<LoadedMap> placed_map_;
   bool frame_answered_ = false;  // a step was answered in it
   std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0;
+  struct OtherMarkers {
+    std::uint64_t messages = 0;
+    std::string newest;
+  };
+  std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;
 
   void loadFiles();

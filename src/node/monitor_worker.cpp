@@ -110,7 +110,7 @@ std::vector<AwaitedTopic> CollisionMonitor::Impl::silentTopics() {
   heard.resize(config.bodies.size());
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (!mesh_subscriptions[b]) continue;
-    const std::uint64_t frames = pipeline.monitor().counters(b).received + queue.size(b);
+    const std::uint64_t frames = pipeline.monitor().counters(b).received + pipeline.passedOver(b) + queue.size(b);
     if (frames != heard[b].frames) heard[b] = {frames, now_ns};
     if (frames > 0 && (pipeline.isStatic(b) || secondsBetween(heard[b].at_ns, now_ns) < patience_s)) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
