@@ -177,6 +177,17 @@ struct BagReplay::Run {
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(at);
   }
+
+  void meshes(const std::vector<std::size_t>& bodies, const rosbag::MessageInstance& message,
+              const std::vector<std::uint8_t>& bytes) {
+    bool is_of_none = true;
+    for (const std::size_t body : bodies) {
+      const std::uint64_t before = pipeline.passedOver(body);
+      mesh(body, message, bytes);
+      is_of_none = is_of_none && pipeline.passedOver(body) > before;
+    }
+    if (is_of_none) ++passed_over[message.getTopic()];
+  }
 };
 
 BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options)
@@ -357,15 +368,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     }
     transforms.feedUntil(at);
     for (const std::string& line : run.feed.takeComplaints()) run.complain("tf: " + line);
-    if (is_mesh) {
-      bool passed_over = true;
-      for (const std::size_t body : bodies->second) {
-        const std::uint64_t before = run.pipeline.passedOver(body);
-        run.mesh(body, m, bytes);
-        passed_over = passed_over && run.pipeline.passedOver(body) > before;
-      }
-      if (passed_over) ++run.passed_over[m.getTopic()];
-    }
+    if (is_mesh) run.meshes(bodies->second, m, bytes);
     const bool is_map = bag_maps && m.getTopic() == map_topic;
     if (is_map && !std::exchange(first_is_taken, false)) run.mapMessage(m);
     run.placeCloud(at);

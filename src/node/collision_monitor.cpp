@@ -89,12 +89,13 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
   frames_handed_over += message.object.type != nullptr;
-  // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
-  if (!enabled && !pipeline.isStatic(body)) {
+  // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
+  // voxels are followed by where the bodies were.
+  if (!enabled && !pipeline.isStatic(body) && !config.ownsVoxels()) {
     ++disabled_frames[body];
     return;
   }
-  if (body == config.monitor.clock_body) state.frameCame(now_ns);
+  if (body == config.monitor.clock_body && enabled) state.frameCame(now_ns);
   message.receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   message.arrival_ns = now_ns;
   queue.push(body, std::move(message));

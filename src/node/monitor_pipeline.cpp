@@ -183,7 +183,9 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
     if (!isHopeless(body)) return false;
     monitor_->dropSteps(StepStatus::NO_BODY, missing(body));
   }
+  if (resting_) monitor_->dropSteps(StepStatus::DISABLED, "the monitor is disabled");
   if (!monitor_->next(now_ns, outcome)) return false;
+  if (resting_) return true;
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);

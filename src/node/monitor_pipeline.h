@@ -62,6 +62,10 @@ class MonitorPipeline {
   bool nextOutcome(std::int64_t now_ns, Outcome& outcome);
   /// Something waits for tf or for other bodies, so that nextOutcome() is worth calling again without new input.
   bool waiting() const;
+  /// While it rests no step is computed, and outcomes say nothing but that. Where bodies are, and which voxels are
+  /// their own, is followed all the same: what maps show meanwhile could not be told from the bodies afterwards.
+  void rest(bool resting) { resting_ = resting; }
+  bool isResting() const { return resting_; }
   /// End of input: whatever still waits is given up at the next call of nextOutcome().
   void finish();
   /// Forgets all frames but those of static bodies, also where they wait. After RESET triangle soups are welded anew,
@@ -190,6 +194,7 @@ class MonitorPipeline {
   std::optional<LoadedMap> placed_map_;
   bool frame_answered_ = false;  // a step was answered in it
   std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0;
+  bool resting_ = false;
   struct OtherMarkers {
     std::uint64_t messages = 0;
     std::string newest;

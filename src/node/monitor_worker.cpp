@@ -269,7 +269,9 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   accountDropped();
   if (holdsStaticFrames()) state.staticInUse(static_frames);
   Outcome outcome;
-  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
+  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) {
+    if (!pipeline.isResting()) publishOutcome(outcome);
+  }
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
   tellComplaints();
   const std::string surprise = recorder.takeSurprise();

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
+#include <new>
 #include <sstream>
 #include <utility>
 
@@ -101,6 +102,18 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
     takeMap(maps_to_come.front(), bodies_tracked);
     maps_to_come.pop_front();  // should memory end before, the next step takes it
   }
+}
+
+void Monitor::Impl::followOwnVoxels(StampNs stamp_ns) try {
+  StampNs known_until_ns = stamp_ns;
+  for (const TrackedBody& body : tracked()) {
+    if (!body.holds_always && !body.frames->empty()) {
+      known_until_ns = std::min(known_until_ns, body.frames->newest().stamp_ns);
+    }
+  }
+  takeMaps(known_until_ns);
+} catch (const std::bad_alloc&) {
+  // The maps wait for the next one.
 }
 
 void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked) {

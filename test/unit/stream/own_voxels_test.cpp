@@ -571,6 +571,36 @@ TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
   }
 }
 
+// As the node does it while ~enable is false: the cloth is carried up by 0.3 m and rests there, and maps come all the
+// time. Else all that they showed meanwhile would be in doubt for as long as it rests.
+TEST_F(OwnVoxels, OverStepsThatAreNotWantedWhatIsOwnIsFollowed) {
+  const Cells late_obstacle{{5, 5, 10}};
+  for (const bool obstacle : {false, true}) {
+    start(0.05);
+    hoverAboveFloor();
+    const auto height = [](int k) { return 0.55 + 0.015 * std::min(k, 20); };
+    monitor_->reset(StepStatus::DISABLED);
+    for (int k = 2; k < 40; ++k) {
+      map(k * 100 * MS, slab(1) + voxelsOf(height(k)) + (obstacle && k > 10 ? late_obstacle : Cells()));
+      monitor_->countReceived(0);
+      monitor_->push(0, sheet(k * 100 * MS, height(k)), NOW);
+      monitor_->dropSteps(StepStatus::DISABLED, "a test");
+      Outcome outcome;
+      ASSERT_TRUE(monitor_->next(NOW, outcome));
+      EXPECT_FALSE(outcome.answered);
+    }
+    monitor_->reset(StepStatus::DISABLED);
+    feed(4000 * MS, 0.85);
+    map(4000 * MS, slab(1) + voxelsOf(0.85) + (obstacle ? late_obstacle : Cells()));
+    const Outcome rests = feed(4100 * MS, 0.85);
+    EXPECT_TRUE(assuranceOf(rests).clear()) << describe(assuranceOf(rests));
+    EXPECT_EQ(own(rests), 25u);
+    const Outcome rises = feed(4200 * MS, 1.02);
+    EXPECT_EQ(assuranceOf(rises).touching, obstacle ? Touching::NEW : Touching::NONE) << "one that came meanwhile";
+    expectAddsUp(*monitor_);
+  }
+}
+
 TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {
   ObstacleMap table = mapOf(VOXEL_M, {voxelAt(4, 4, 4)}, 0);
   monitor_->setMapBeside(table);
