@@ -3,9 +3,10 @@
 
 usage: contacts_over_time.py FOLDER PICTURE [FRAMES_PER_SECOND]
 
-The frames are meshes with the same triangles, in the order of their names.
+The frames are meshes with the same triangles, in the order of their names, 2.obj before 10.obj.
 """
 import pathlib
+import re
 import sys
 
 import matplotlib
@@ -28,11 +29,16 @@ def contacts_of(files, rate_hz):
         yield i / rate_hz, dccd.detect(body, history=history, num_threads=2)
 
 
+def in_order(path):
+    """Numbers in a name count as numbers."""
+    return [int(part) if part.isdigit() else part for part in re.split(r'([0-9]+)', path.name)]
+
+
 def main():
     folder, picture = pathlib.Path(sys.argv[1]), sys.argv[2]
     rate_hz = float(sys.argv[3]) if len(sys.argv) > 3 else 30.0
     times, certain, undecided = [], [], []
-    for time_s, outcome in contacts_of(sorted(p for p in folder.iterdir() if p.is_file()), rate_hz):
+    for time_s, outcome in contacts_of(sorted((p for p in folder.iterdir() if p.is_file()), key=in_order), rate_hz):
         print('%.3f s: %s' % (time_s, outcome))
         times.append(time_s)
         certain.append(np.count_nonzero(outcome.contacts['certain']))

@@ -10,6 +10,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <set>
+#include <utility>
 
 #include "apps/decimal_options.h"
 #include "dccd/detect.h"
@@ -192,6 +194,42 @@ std::string sizesOf(const MeshFile& frame) {
          " faces and " + std::to_string(frame.edges.size()) + " edges of lines";
 }
 
+/// A name without its numbers, and these: how many digits, without zeros before them, and which.
+struct NumberedName {
+  std::string text;
+  std::vector<std::pair<std::size_t, std::string>> numbers;
+
+  explicit NumberedName(const std::string& name) {
+    const auto isDigit = [](char c) { return c >= '0' && c <= '9'; };
+    for (auto at = name.begin(); at != name.end();) {
+      const auto end = std::find_if_not(at, name.end(), isDigit);
+      if (end == at) {
+        text += *at++;
+        continue;
+      }
+      text += '0';
+      const std::string digits(std::find_if(at, end, [](char c) { return c != '0'; }), end);
+      numbers.emplace_back(digits.size(), digits);
+      at = end;
+    }
+  }
+};
+
+/// A shell has 10.obj before 2.obj. Whoever names frames that go neither up nor down means another order.
+void requireOrder(const std::vector<std::string>& paths) {
+  if (std::set<std::string>(paths.begin(), paths.end()).size() < paths.size()) return;
+  const std::vector<NumberedName> names(paths.begin(), paths.end());
+  const auto isOther = [&](const NumberedName& name) { return name.text != names[0].text; };
+  if (std::any_of(names.begin(), names.end(), isOther)) return;
+  const auto isLess = [](const NumberedName& a, const NumberedName& b) { return a.numbers < b.numbers; };
+  const auto descent = std::is_sorted_until(names.begin(), names.end(), isLess);
+  if (descent == names.end() || std::is_sorted(names.rbegin(), names.rend(), isLess)) return;
+  const auto at = static_cast<std::size_t>(descent - names.begin());
+  throw std::runtime_error(paths[at - 1] + " stands before " + paths[at] +
+                           ": the numbers in the names go neither up nor down; give the frames in their order, as by "
+                           "$(ls -v ...)");
+}
+
 std::vector<MeshFile> framesOf(const std::vector<std::string>& paths) {
   std::vector<MeshFile> frames;
   for (const std::string& path : paths) {
@@ -241,6 +279,7 @@ std::vector<Step> stepsOf(const Arguments& a) {
 
 int checkStep(const Arguments& a) {
   for (const std::string& frame : a.frames) refuseToOverwrite(frame, {a.contacts, a.stats});
+  requireOrder(a.frames);
   setSimdTarget(a.simd);
   const std::vector<Step> steps = stepsOf(a);
   Run run;

@@ -112,8 +112,10 @@ void describe(const StepRecording& r) {
             << " s, accuracy " << toString(r.options.accuracy.rung) << "; " << r.note << '\n'
             << std::defaultfloat;
   for (const Body& body : r.step.bodies) {
-    std::cout << "  body '" << body.name << "': " << body.t0->size() << " vertices, " << body.topology->faces().size()
-              << " faces\n";
+    const Topology& topology = *body.topology;
+    std::cout << "  body '" << body.name << "': " << body.t0->size() << " vertices, "
+              << (topology.hasFaces() ? topology.faces().size() : topology.edges().size())
+              << (topology.hasFaces() ? " faces\n" : " edges\n");
   }
   if (r.step.map.surface) std::cout << "  map: " << r.step.map.surface->leafCount() << " occupied leaves\n";
 }

@@ -193,6 +193,7 @@ void readRobot(ParameterReader& reader, const RobotLoader& load, MonitorConfig& 
   if (!robot.left_out.empty()) {
     config.robot_excluded.push_back("of the robot " + quoted(robot.left_out) + " by robot/leave_out");
   }
+  for (const std::string& clause : robot.excluded) config.robot_excluded.push_back("of the robot " + clause);
   if (robot.parts.size() < 2) return;
   if (!asked.against_links) {
     config.robot_excluded.push_back("links of the robot against each other");

@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -171,6 +175,7 @@ class DaeReader {
   /// The corners of all polygons of the scene, and where each polygon ends.
   Positions corners;
   std::vector<std::size_t> ends;
+  std::vector<std::pair<std::size_t, int>> lines_of;  // from which polygon on, and 0 or where a list of lines stands
 
   void read() {
     const Eigen::Affine3d unit(Eigen::Scaling(ids_.metres(root_)));
@@ -226,6 +231,7 @@ class DaeReader {
     forChildren(at, "vcount", [&](const XMLElement& vcount) {
       forEachIndex(vcount, [&](std::size_t size) { sizes.push_back(size); });
     });
+    lines_of.emplace_back(ends.size(), lines || chains ? at.GetLineNum() : 0);
     const std::size_t vcounts = sizes.size();
     std::size_t lists = 0, polygons = 0;
     forChildren(at, "p", [&](const XMLElement& p) {
@@ -352,7 +358,13 @@ MeshFile loadDaeFile(const std::string& path) {
   }
   if (reader.corners.empty()) throw MeshFileError(path + ": there are no triangles");
   MeshFile mesh = weldPolygons(reader.corners, std::move(reader.ends), path);
-  remarkUnchecked([](std::size_t p) { return "polygon " + std::to_string(p) + " of the scene"; }, mesh);
+  const auto name = [lines_of = std::move(reader.lines_of)](std::size_t p) {
+    const auto next = std::upper_bound(lines_of.begin(), lines_of.end(), std::pair(p, std::numeric_limits<int>::max()));
+    const int line = std::prev(next)->second;
+    return "polygon " + std::to_string(p) + " of the scene" +
+           (line > 0 ? ", a segment of <lines> in line " + std::to_string(line) : "");
+  };
+  remarkUnchecked(name, mesh);
   return mesh;
 }
 

@@ -5,16 +5,13 @@
 #include <tuple>
 #include <utility>
 
+#include "input/marker_names.h"
 #include "input/mesh_decoder.h"
 #include "input/short_text.h"
 
 namespace dccd {
 
 namespace {
-
-std::string nameOf(std::string_view ns, std::int32_t id) {
-  return "('" + std::string(ns.substr(0, 32)) + "', " + std::to_string(id) + ")";
-}
 
 void requirePoints(const MarkerView& marker) {
   const bool pairs = marker.type == MARKER_LINE_LIST;
@@ -25,19 +22,23 @@ void requirePoints(const MarkerView& marker) {
 
 void add(const MarkerView& marker, Ropes& ropes) {
   const Eigen::Affine3d pose = poseOf(marker);
-  const bool pairs = marker.type == MARKER_LINE_LIST;
+  const auto first = static_cast<Index>(ropes.points.size());
   for (std::size_t i = 0; i < marker.points.size; ++i) {
     const auto p = marker.points[i];
-    const auto v = static_cast<Index>(ropes.points.size());
     ropes.points.push_back(pose * Vec3(p[0], p[1], p[2]));
-    if (pairs ? i % 2 == 1 : i > 0) ropes.edges.push_back({v - 1, v});
-    if (pairs || (isLineMarker(marker) && (i == 0 || i + 1 == marker.points.size))) ropes.ends.push_back(v);
   }
+  if (marker.type == MARKER_LINE_LIST) {
+    for (Index v = first; v < ropes.points.size(); ++v) {
+      if ((v - first) % 2 == 1) ropes.edges.push_back({v - 1, v});
+      ropes.ends.push_back(v);
+    }
+    return;
+  }
+  const Index last = addLine(ropes.points, first, ropes.points.size(), ropes.edges);
+  if (isLineMarker(marker)) ropes.ends.insert(ropes.ends.end(), {first, last});
 }
 
 }  // namespace
-
-std::string nameOf(const MarkerView& marker) { return nameOf(marker.ns, marker.id); }
 
 Eigen::Affine3d poseOf(const MarkerView& marker) {
   for (const double value : marker.pose) {
@@ -49,6 +50,21 @@ Eigen::Affine3d poseOf(const MarkerView& marker) {
   if (q.norm() > 0) transform.linear() = q.normalized().toRotationMatrix();
   transform.translation() = Vec3(marker.pose[0], marker.pose[1], marker.pose[2]);
   return transform;
+}
+
+Index addLine(const Positions& points, std::size_t begin, std::size_t end, std::vector<Edge>& edges) {
+  auto at = static_cast<Index>(begin);
+  for (std::size_t i = begin + 1; i < end;) {
+    std::size_t next = i;  // that does not equal the point before i
+    while (next < end && points[next] == points[i - 1]) ++next;
+    if (next - i >= 2) {
+      i = next;
+      continue;
+    }
+    edges.push_back({at, static_cast<Index>(i)});
+    at = static_cast<Index>(i++);
+  }
+  return at;
 }
 
 Ropes ropesOf(std::vector<const MarkerView*> markers) {

@@ -17,8 +17,6 @@ inline bool isLineMarker(const MarkerView& marker) {
 inline bool isPointMarker(const MarkerView& marker) {
   return marker.type == MARKER_POINTS || marker.type == MARKER_SPHERE_LIST;
 }
-/// Namespace and id, for messages.
-std::string nameOf(const MarkerView& marker);
 /// Without its scale: of lines and points that is how thick they are drawn. Throws WireError for a pose that is not
 /// finite.
 Eigen::Affine3d poseOf(const MarkerView& marker);
@@ -39,6 +37,11 @@ struct Ropes {
 
 /// Of markers that are lines, or points. Throws WireError for one of too few points.
 Ropes ropesOf(std::vector<const MarkerView*> markers);
+
+/// Adds the edges of a line through the points from `begin` to before `end`. Returns the point at which it ends. Of
+/// three and more equal points in a row the first stands for all: the edges before and after them, which touch there,
+/// are neighbours then. No edge has the others, as long as they are equal.
+Index addLine(const Positions& points, std::size_t begin, std::size_t end, std::vector<Edge>& edges);
 
 /// Whether these are the ropes of the message before: as many, of as many points. Throws WireError where some have
 /// other names then, and others not.

@@ -1,5 +1,6 @@
 #include "input/mesh_decoder.h"
 
+#include <algorithm>
 #include <sstream>
 
 #include "input/marker_ropes.h"
@@ -192,9 +193,10 @@ void MeshDecoder::takePolylines(std::size_t length, DecodedMesh& mesh) {
     throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(length) + " points, but a polyline needs 2");
   }
   std::vector<Edge> edges;
-  for (Index v = 1; v < mesh.positions.size(); ++v) {
-    if (v % length != 0) edges.push_back({v - 1, v});
+  for (std::size_t begin = 0; begin < mesh.positions.size(); begin += length) {
+    addLine(mesh.positions, begin, begin + length, edges);
   }
+  if (edges.empty()) refuse("there is nothing to check: all points of a line are one");
   takeLines(edges, mesh);
 }
 
@@ -317,21 +319,33 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   return mesh;
 }
 
+bool MeshDecoder::isWanted(const MarkerView& marker) const {
+  return (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
+         (!config_.marker_id || marker.id == *config_.marker_id) && marker.action == MARKER_ADD;
+}
+
+bool MeshDecoder::isReadable(const MarkerView& marker) const {
+  const bool is_polyline = config_.source == TopologySource::POLYLINE;
+  return marker.type == MARKER_TRIANGLE_LIST
+             ? !is_polyline
+             : isLineMarker(marker) || (isPointMarker(marker) && (is_polyline || hasFixedTopology()));
+}
+
+bool MeshDecoder::passesOver(const std::vector<MarkerView>& markers) const {
+  const auto none = [&](auto is) { return !markers.empty() && std::none_of(markers.begin(), markers.end(), is); };
+  if (none([](const MarkerView& one) { return one.action == MARKER_ADD; })) return true;
+  const bool is_named = config_.marker_namespace || config_.marker_id;
+  if (is_named && none([&](const MarkerView& one) { return isWanted(one); })) return true;
+  return none([&](const MarkerView& one) { return isWanted(one) && (isReadable(one) || !names_.isOther(one)); });
+}
+
 DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
   std::string seen;
-  const MarkerView* taken = nullptr;
-  std::vector<const MarkerView*> lines, points;
-  std::uint64_t unread = 0, unread_faces = 0;
+  std::vector<const MarkerView*> lists, lines, points;
   for (const MarkerView& marker : markers) {
-    const bool wanted = (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
-                        (!config_.marker_id || marker.id == *config_.marker_id) && marker.action == MARKER_ADD;
+    const bool wanted = isWanted(marker);
     if (wanted && marker.type == MARKER_TRIANGLE_LIST && config_.source != TopologySource::POLYLINE) {
-      if (taken) {
-        ++unread;
-        unread_faces += (marker.points.size + 2) / 3;
-      } else {
-        taken = &marker;
-      }
+      lists.push_back(&marker);
     } else if (wanted && isLineMarker(marker) && marker.points.size > 0) {
       lines.push_back(&marker);
     } else if (wanted && isPointMarker(marker) && marker.points.size > 0) {
@@ -342,22 +356,28 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
     }
   }
   // What is drawn of a mesh besides its faces, or of a rope besides its lines, is nothing of its own.
-  if (taken) {
-    DecodedMesh mesh = decodeSoup(*taken);
-    mesh.unread_lists = unread;
-    mesh.dropped_faces += unread_faces;
-    return mesh;
+  const std::vector<const MarkerView*>& taken = !lists.empty() ? lists : !lines.empty() ? lines : points;
+  const bool passed_over = passesOver(markers);
+  if (taken.empty() || passed_over) {
+    const std::string text =
+        "no " + std::string(config_.source == TopologySource::POLYLINE ? "" : "TRIANGLE_LIST marker and no ") +
+        "LINE_STRIP, LINE_LIST or POINTS with the wanted namespace and id; there are (namespace, id, type):" +
+        (seen.empty() ? " none" : seen);
+    if (passed_over) throw PassedOver(text);
+    refuse(text);
   }
-  if (!lines.empty()) return decodeRopes(std::move(lines));
-  if (!points.empty() && config_.source != TopologySource::POLYLINE && !hasFixedTopology()) {
+  if (&taken == &points && config_.source != TopologySource::POLYLINE && !hasFixedTopology()) {
     refuse("marker " + nameOf(*points[0]) +
            " has points without a topology; set topology/source to polyline or file, or topology/rows and "
            "topology/cols for a grid");
   }
-  if (!points.empty()) return decodeRopes(std::move(points));
-  refuse("no " + std::string(config_.source == TopologySource::POLYLINE ? "" : "TRIANGLE_LIST marker and no ") +
-         "LINE_STRIP, LINE_LIST or POINTS with the wanted namespace and id; there are (namespace, id, type):" +
-         (seen.empty() ? " none" : seen));
+  names_.require(taken);
+  DecodedMesh mesh = &taken == &lists ? decodeSoup(*lists[0]) : decodeRopes(taken);
+  names_.keep(taken);
+  if (&taken != &lists) return mesh;
+  mesh.unread_lists = lists.size() - 1;
+  for (std::size_t i = 1; i < lists.size(); ++i) mesh.dropped_faces += (lists[i]->points.size + 2) / 3;
+  return mesh;
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
@@ -373,7 +393,7 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     const auto p = marker.points[i];
     corners[i] = Vec3(p[0], p[1], p[2]);
   }
-  if (!known_ropes_.empty()) forgetWeld();  // it is of their ends
+  if (!known_ropes_.empty()) forgetJoints();  // they are of their ends
   const bool welds_anew = weld_.vertexOfCorner().size() != count;
   if (config_.weld && config_.source != TopologySource::FILE) {
     mesh.weld_changes = weld_.weld(corners);

@@ -10,6 +10,7 @@
 
 #include "dccd/mesh_store.h"
 #include "input/depth_surface.h"
+#include "input/marker_names.h"
 #include "input/marker_ropes.h"
 #include "input/message_type.h"
 #include "input/polygons.h"
@@ -47,6 +48,12 @@ struct MeshError : std::runtime_error {
   StepStatus status;
 };
 
+/// A message of markers that are none of the mesh, by their names or because they only take others away: no frame, and
+/// none is missing.
+struct PassedOver : MeshError {
+  explicit PassedOver(const std::string& text) : MeshError(StepStatus::BAD_MESSAGE, text) {}
+};
+
 /// A frame in the coordinates of the message's own frame; stamp_ns is 0 where the message has none.
 struct DecodedMesh : MeshFrame {
   std::string frame_id;
@@ -61,12 +68,13 @@ class MeshDecoder {
   explicit MeshDecoder(MeshInputConfig config);
 
   /// `datatype` as in the connection header, package/Name. `object`: in place of bytes, of a message that was never
-  /// serialised. Throws MeshError; after one the decoder is as before.
+  /// serialised. Throws MeshError, of a message that is to be passed over PassedOver; after one the decoder is as
+  /// before, but for names of markers that contradict each other.
   DecodedMesh decode(const std::string& datatype, WireSpan<std::uint8_t> bytes, const TypedMesh& object = {});
-  /// The next triangle soup is welded as a first one, and so are the ends of lines.
+  /// The next triangle soup is welded as a first one, and so are the ends of lines; markers may have other names.
   void forgetWeld() {
-    weld_.forget();
-    known_ropes_.clear();
+    forgetJoints();
+    names_.forget();
   }
 
  private:
@@ -81,6 +89,12 @@ class MeshDecoder {
   Known known_;
   SoupWeld weld_;                      // of a triangle soup's corners, or of the ends of lines
   std::vector<RopeName> known_ropes_;  // of the last markers that were read
+  MarkerNames names_;
+
+  void forgetJoints() {
+    weld_.forget();
+    known_ropes_.clear();
+  }
 
   DecodedMesh decodeView(const CloudView& cloud);
   DecodedMesh decodeView(const IndexedView& mesh);
@@ -90,6 +104,11 @@ class MeshDecoder {
   DecodedMesh decodeRopes(std::vector<const MarkerView*> markers);  // in marker_ropes.cpp
   bool isRope(const CloudView& cloud) const;
   bool hasFixedTopology() const;
+  /// Whether the marker is of a type that becomes a mesh here, and has the wanted name.
+  bool isWanted(const MarkerView& marker) const;
+  bool isReadable(const MarkerView& marker) const;
+  /// Nothing of the message is the mesh, and the mesh is elsewhere: by the names of its markers.
+  bool passesOver(const std::vector<MarkerView>& markers) const;
   void checkFaces(std::size_t count) const;
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;

@@ -16,6 +16,7 @@ struct MeshMessage {
   StampNs receipt_ns = 0;           ///< stands in for the stamp of messages without one
   std::int64_t arrival_ns = 0;      ///< on the clock that drives the pipeline
   std::string md5 = "*";            ///< of the type as the publisher knows it
+  std::string definition = {};      ///< of a type with another md5 than the one that is known here
   TypedMesh object = {};
   std::size_t too_large = 0;  ///< bytes that it had; it was emptied, since no queue has room for it
   std::size_t no_memory = 0;  ///< bytes that it had; there was not the memory to take them over

@@ -98,6 +98,8 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
       MeshMessage message;
       message.datatype = heard_type_;
       message.md5 = bytes->getMD5Sum();
+      const MeshType* type = findMeshType(heard_type_);
+      if (type && message.md5 != type->md5) message.definition = bytes->getMessageDefinition();
       if (hasMemoryFor(bytes->size())) {
         message.bytes = bytesOf(*bytes);
       } else {

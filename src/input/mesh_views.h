@@ -84,6 +84,7 @@ struct MarkerView {
   HeaderView header;
   std::string_view ns;
   std::int32_t id = 0, type = 0, action = 0;
+  bool is_message = false;       ///< of its own; else it came in an array, which is one
   std::array<double, 7> pose{};  ///< position x y z, quaternion x y z w
   std::array<double, 3> scale{};
   WireSpan<PointOnWire> points;

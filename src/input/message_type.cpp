@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "input/message_layout.h"
+
 namespace dccd {
 
 namespace {
@@ -50,9 +52,14 @@ std::string md5Problem(const std::string& datatype, const std::string& md5, cons
          ": publisher and monitor were built with different definitions";
 }
 
-std::string meshTypeProblem(const std::string& datatype, const std::string& md5) {
+std::string meshTypeProblem(const std::string& datatype, const std::string& md5, const std::string& definition) {
   const MeshType* type = findMeshType(datatype);
-  if (type) return md5Problem(datatype, md5, type->md5);
+  if (type) {
+    const std::string problem = md5Problem(datatype, md5, type->md5);
+    if (problem.empty() || definition.empty()) return problem;
+    const std::string difference = layoutDifference(datatype, definition, type->definition);
+    return difference.empty() ? "" : problem + ": " + difference;
+  }
   return "type " + datatype + " is not a mesh; publish " + anyOf(meshTypes());
 }
 

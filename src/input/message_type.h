@@ -34,6 +34,7 @@ struct MeshType {
   const char* name;      ///< in the parameter `type`
   const char* datatype;  ///< in ROS, package/Name
   const char* md5;
+  const char* definition;  ///< its text, with those of the types of its fields
   bool leads_with_header;  ///< its first field is a std_msgs/Header
   /// What a serialised message says, as views into its bytes. `extra_field`: the point field that must be there, where
   /// the type has point fields. Throws WireError.
@@ -53,8 +54,9 @@ const std::vector<MeshType>& meshTypes();
 /// Null: no accepted type has this ROS name.
 const MeshType* findMeshType(const std::string& datatype);
 
-/// Empty when messages of this type can be read; else one sentence. md5 "*" stands for any.
-std::string meshTypeProblem(const std::string& datatype, const std::string& md5);
+/// Empty when messages of this type can be read; else one sentence. md5 "*" stands for any. One with another md5 and
+/// the same layout can: older definitions lack constants. `definition`: as its publisher has it; empty: not known.
+std::string meshTypeProblem(const std::string& datatype, const std::string& md5, const std::string& definition = {});
 /// The part of it that is about the md5, for a type with a `known` one.
 std::string md5Problem(const std::string& datatype, const std::string& md5, const std::string& known);
 
@@ -81,6 +83,7 @@ MeshType meshType(const char* name) {
   row.name = name;
   row.datatype = traits::datatype<Message>();
   row.md5 = traits::md5sum<Message>();
+  row.definition = traits::definition<Message>();
   row.leads_with_header = traits::hasHeader<Message>();
   row.read = [](WireReader& wire, const std::string& extra_field) -> MeshView { return READ(wire, extra_field); };
   row.readHeader = [](WireReader& wire) {

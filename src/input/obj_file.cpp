@@ -102,7 +102,12 @@ class ObjReader {
     }
     const std::string small = inSmallLetters(keyword.text);
     if (isOneOf(READ, small) || isOneOf(OTHER_GEOMETRY, small)) lines_.fail(keyword, "must be in small letters");
-    if (decimalNumber(keyword.text)) lines_.fail(keyword, "begins a line, and no line goes on with '\\' before it");
+    const bool is_first = mesh_.positions.empty() && polygons_.size() == 0 && unknown_lines_ == 0;
+    if (decimalNumber(keyword.text)) {
+      lines_.fail(keyword, is_first
+                               ? "begins the first line, where an OBJ file has 'v', 'f' or 'l': it is of another format"
+                               : "begins a line, and no line goes on with '\\' before it");
+    }
     if (unknown_lines_++ == 0) first_unknown_ = inQuotes(keyword.text) + " in line " + std::to_string(keyword.line);
   }
 

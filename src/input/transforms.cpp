@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -53,6 +54,9 @@ std::string problemOf(const geometry_msgs::TransformStamped& transform) {
 
 }  // namespace
 
+TransformFeed::TransformFeed(tf2::BufferCore& buffer)
+    : buffer_(buffer), max_kept_(static_cast<std::size_t>(MAX_KEPT * buffer.getCacheLength().toSec() / 10)) {}
+
 const TransformFeed::Frame* TransformFeed::frameOf(const std::string& name) const {
   const auto found = frames_.find(name);
   return found == frames_.end() ? nullptr : &found->second;
@@ -68,21 +72,56 @@ TransformFeed::Frame* TransformFeed::roomFor(const std::string& name) {
   return &frame;
 }
 
-bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
+const std::string* TransformFeed::senderOf(const std::string& name) {
+  return &*senders_.insert(senders_.size() < MAX_SENDERS || senders_.count(name) > 0 ? name : std::string()).first;
+}
+
+TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped& transform,
+                                          const std::string& sender) const {
   const Frame* frame = frameOf(unslashed(transform.child_frame_id));
-  if (!frame || frame->sent.empty()) return false;
+  if (!frame || frame->sent.empty()) return Jump::NONE;
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
   const auto newest = std::prev(frame->sent.end()), at_stamp = frame->sent.find(stamp_ns);
-  if (stamp_ns < newest->first - JUMP_BACK_NS) return true;
-  if (at_stamp == frame->sent.end() || at_stamp == newest) return false;
+  const bool is_far = stamp_ns < newest->first - JUMP_BACK_NS;
+  if (!is_far && (at_stamp == frame->sent.end() || at_stamp == newest)) return Jump::NONE;
+  if (is_far) {
+    const auto its_newest = frame->newest.find(sender);
+    const bool went_back = its_newest != frame->newest.end() && stamp_ns < its_newest->second - JUMP_BACK_NS;
+    return went_back ? Jump::LOOP : Jump::TWO_SENDERS;
+  }
   const Pose &before = at_stamp->second.pose, now = poseOf(transform.transform);
-  return at_stamp->second.parent != frameOf(unslashed(transform.header.frame_id)) ||
-         before.translation != now.translation || before.rotation.coeffs() != now.rotation.coeffs();
+  const bool is_there = at_stamp->second.parent == frameOf(unslashed(transform.header.frame_id)) &&
+                        before.translation == now.translation && before.rotation.coeffs() == now.rotation.coeffs();
+  if (is_there) return Jump::NONE;
+  return *at_stamp->second.sender == sender ? Jump::LOOP : Jump::TWO_SENDERS;
+}
+
+/// What was sent of one that moves. tf2 forgets all frames or none.
+void TransformFeed::forget(Frame& frame) {
+  kept_count_ -= frame.sent.size();
+  frame.sent.clear();
+  frame.is_cut = frame.is_apart = has_apart_ = true;
+}
+
+void TransformFeed::forgetAllOf(const std::string& sender) {
+  const auto isIts = [&](const auto& named) {
+    return named.second.sent.empty() || named.second.newest.count(sender) > 0;
+  };
+  if (std::all_of(frames_.begin(), frames_.end(), isIts)) return clear();
+  for (auto& named : frames_) {
+    const auto its_newest = named.second.newest.find(sender);
+    if (its_newest == named.second.newest.end()) continue;
+    its_newest->second = 0;
+    forget(named.second);
+  }
 }
 
 /// Else it is kept, and those are forgotten that the buffer forgets with it.
 bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame) {
-  if (!frame.sent.emplace(static_cast<StampNs>(transform.header.stamp.toNSec()), sent).second) return true;
+  const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+  const auto newest = frame.newest.try_emplace(*sent.sender, stamp_ns).first;
+  newest->second = std::max(newest->second, stamp_ns);
+  if (!frame.sent.emplace(stamp_ns, sent).second) return true;
   const auto old =
       frame.sent.lower_bound(frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
   const std::size_t before = frame.sent.size();
@@ -97,16 +136,18 @@ void TransformFeed::clear() {
   buffer_.clear();
   for (auto& named : frames_) {
     named.second.sent.clear();
-    named.second.is_cut = false;
+    named.second.newest.clear();
+    named.second.is_cut = named.second.is_apart = false;
   }
   kept_count_ = 0;
+  has_apart_ = false;
   ++times_forgotten_;
 }
 
-bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {
+bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return !is_static && std::any_of(message.transforms.begin(), message.transforms.end(), [&](const auto& transform) {
-    return problemOf(transform).empty() && goesBack(transform);
+    return problemOf(transform).empty() && jumpOf(transform, sender) == Jump::LOOP;
   });
 }
 
@@ -160,7 +201,7 @@ std::vector<std::string> TransformFeed::takeComplaints() {
   return std::exchange(complaints_, {});
 }
 
-bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
+bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender) {
   const std::lock_guard<std::mutex> lock(mutex_);
   bool cleared = false;
   for (const auto& transform : message.transforms) {
@@ -173,7 +214,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
     Frame* frame = roomFor(unslashed(transform.child_frame_id));
     if (!parent || !frame) continue;
     ++change_;
-    const Sent sent{parent, poseOf(transform.transform)};
+    const Sent sent{parent, poseOf(transform.transform), senderOf(sender)};
     if (!frame->is_static) frame->is_static = is_static;
     if (*frame->is_static != is_static) {
       if (!isThere(*frame, sent)) dispute(transform, *frame);
@@ -183,11 +224,13 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
       if (frame->fixed.parent && !isThere(*frame, sent)) ++times_forgotten_;
       frame->fixed = sent;
     } else {
-      if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
-        clear();
-        cleared = true;
-      }
-      if (isRepeated(transform, sent, *frame)) continue;
+      const Jump jump = jumpOf(transform, *sent.sender);
+      const bool is_full = kept_count_ >= max_kept_;
+      cleared = cleared || is_full || jump != Jump::NONE;
+      if (is_full) clear();
+      if (jump == Jump::TWO_SENDERS) forget(*frame);
+      if (jump == Jump::LOOP) forgetAllOf(*sent.sender);
+      if (isRepeated(transform, sent, *frame) || frame->is_apart) continue;
     }
     buffer_.setTransform(transform, "tf", is_static);
   }
@@ -201,6 +244,15 @@ bool TransformFeed::isThere(const Frame& frame, const Sent& sent) {
   return last.parent == sent.parent &&
          (last.pose.translation - sent.pose.translation).norm() <= tolerance::RIGID_PATH_M &&
          last.pose.rotation.angularDistance(sent.pose.rotation) <= tolerance::RIGID_PATH_M;
+}
+
+/// On the way that was found last, or as far as it goes; null: none.
+const TransformFeed::Frame* TransformFeed::firstApart() const {
+  for (const Chain* chain : {&from_target_, &from_source_}) {
+    const auto found = std::find_if(chain->begin(), chain->end(), [](const Frame* frame) { return frame->is_apart; });
+    if (found != chain->end()) return *found;
+  }
+  return nullptr;
 }
 
 /// For good, as for tf2 a frame stays what it was first.
@@ -237,12 +289,29 @@ const TransformFeed::Sent& TransformFeed::sentAt(const Frame& frame, StampNs sta
   std::string parent;
   if (at != frame.sent.end()) {
     frame.asked = at->second;
+  } else if (frame.is_apart) {
+    frame.asked = between(frame, stamp_ns);
   } else if (buffer_._getParent(frame.name, toTime(stamp_ns), parent)) {
     frame.asked = {frameOf(parent), poseOf(buffer_.lookupTransform(parent, frame.name, toTime(stamp_ns)).transform)};
   }
   frame.asked_change = change_;
   frame.asked_ns = stamp_ns;
   return frame.asked;
+}
+
+/// As tf2 has it between two stamps; nowhere between those of two publishers, whose clocks may be apart.
+TransformFeed::Sent TransformFeed::between(const Frame& frame, StampNs stamp_ns) {
+  const auto next = frame.sent.upper_bound(stamp_ns);
+  if (next == frame.sent.begin() || next == frame.sent.end()) return {};
+  const Sent &one = std::prev(next)->second, &other = next->second;
+  if (one.sender != other.sender) return {};
+  if (one.parent != other.parent) return one;
+  const StampNs from_ns = std::prev(next)->first;
+  const double share = static_cast<double>(stamp_ns - from_ns) / static_cast<double>(next->first - from_ns);
+  return {one.parent,
+          {one.pose.rotation.slerp(share, other.pose.rotation).normalized(),
+           (1 - share) * one.pose.translation + share * other.pose.translation},
+          one.sender};
 }
 
 const TransformFeed::Frame* TransformFeed::newestParentOf(const Frame& frame) {
@@ -307,12 +376,28 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
       return frame != nullptr;
     };
     if (has_disputed_ && findWay(target, source, newestParentOf) && isDisputed()) return false;
+    // What tf2 knows of such a frame is out of date.
+    const bool is_way = has_apart_ && findWay(target, source, newestParentOf);
+    const Frame* const apart = has_apart_ ? firstApart() : nullptr;
+    if (apart && is_way && stamp_ns <= 0) {
+      StampNs newest_ns = std::numeric_limits<StampNs>::max();
+      forEachKeptOnWay([&](const Frame& frame) { newest_ns = std::min(newest_ns, frame.sent.rbegin()->first); });
+      stamp_ns = newest_ns;
+    }
     Pose of_target, of_source;
     // The newest common transform is tf2's to find, and so is the reason why there is none.
     if (stamp_ns > 0 && findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
       if (isDisputed()) return false;
       of_target = poseAlong(from_target_);
       of_source = poseAlong(from_source_);
+    } else if (apart) {
+      reason = "nothing is known of '" + shortText(apart->name, MAX_NAME) +
+               "' then; what was sent before is forgotten, as the stamps of ";
+      for (const auto& [sender, newest_ns] : apart->newest) {
+        reason += (sender == apart->newest.begin()->first ? "'" : "' and '") + shortText(sender, MAX_NAME);
+      }
+      reason += apart->newest.size() > 1 ? "', which both send it, are apart" : "' went back";
+      return false;
     } else {
       for (const std::string* name : {&target, &source}) {
         reason = frameNameProblem(*name);

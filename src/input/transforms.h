@@ -23,29 +23,33 @@ namespace dccd {
 
 constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
-/// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
-/// the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that was elsewhere
-/// at a stamp before its newest tells it, as after a simulation's reset. A frame that is on /tf and, elsewhere, on
-/// /tf_static has no place: tf2 would have it at rest where it was sent last, at all times. One that is sent elsewhere
-/// on /tf_static is there at all times from then on, and where it was before is forgotten. Leaves out what tf2 would
-/// write a line to the console for, each time: repeated stamps above all. Any thread may call it.
+/// Feeds a tf2 buffer and forgets what a publisher sent when its stamps jump back, as a looping replay makes them: kept
+/// transforms of the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that
+/// was elsewhere at a stamp before its newest tells it, as after a simulation's reset. Where the stamps of two
+/// publishers of one frame are that far apart, what was sent of this frame is forgotten, each time, and nothing else. A
+/// frame that is on /tf and, elsewhere, on /tf_static has no place: tf2 would have it at rest where it was sent last,
+/// at all times. One that is sent elsewhere on /tf_static is there at all times from then on, and where it was before
+/// is forgotten. Leaves out what tf2 would write a line to the console for, each time: repeated stamps above all. Any
+/// thread may call it.
 class TransformFeed {
  public:
   /// tf2 forgets no name; further frames are left out.
   static constexpr std::size_t MAX_FRAMES = 16384;
-  /// In the 10 s that tf2 keeps, of all frames together: 26,000 a second. Where more come all are forgotten.
+  /// Of all frames together, in each 10 s that the buffer keeps: 26,000 a second. Where more come all are forgotten.
   static constexpr std::size_t MAX_KEPT = std::size_t{1} << 18;
+  /// Further publishers count as one.
+  static constexpr std::size_t MAX_SENDERS = 64;
 
   /// Child frames with unusable transforms that are told of.
   static constexpr std::size_t MAX_TOLD = 16;
 
-  explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
+  explicit TransformFeed(tf2::BufferCore& buffer);
   /// What these bytes of the topic are. Null where they do not hold what they say, which is counted as unusable.
   tf2_msgs::TFMessage::ConstPtr read(const std::string& topic, std::vector<std::uint8_t> bytes);
-  /// Whether add() would clear the buffer.
-  bool clears(const tf2_msgs::TFMessage& message, bool is_static) const;
-  /// Returns true when the buffer was cleared.
-  bool add(const tf2_msgs::TFMessage& message, bool is_static);
+  /// Whether add() would forget what this publisher sent. `sender`: the caller's id of its connection.
+  bool clears(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender = {}) const;
+  /// Returns true when transforms were forgotten.
+  bool add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender = {});
 
   /// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no
   /// transform. A transform of this very stamp is taken as it was sent; tf2 alone would interpolate from it to the next
@@ -86,7 +90,8 @@ class TransformFeed {
   struct Frame;
   struct Sent {
     const Frame* parent = nullptr;
-    Pose pose;  ///< parent_from_frame
+    Pose pose;                            ///< parent_from_frame
+    const std::string* sender = nullptr;  ///< its place in senders_
   };
   /// One that tf has named. What the buffer holds of it is here as well, by numbers.
   struct Frame {
@@ -94,8 +99,10 @@ class TransformFeed {
     std::optional<bool> is_static;  ///< as tf2 takes it, for good, from what came first; none: it is a parent alone
     std::map<StampNs, Sent> sent;   ///< of one that moves
     Sent fixed;                     ///< of one that is static
-    bool is_cut = false;            ///< older ones were sent
-    bool is_disputed = false;       ///< it is on both topics, and not at one place
+    std::map<std::string, StampNs> newest;  ///< of each publisher; 0: it went back
+    bool is_cut = false;                    ///< older ones were sent
+    bool is_apart = false;                  ///< some were forgotten that the buffer holds; it gets no more
+    bool is_disputed = false;               ///< it is on both topics, and not at one place
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;
     mutable StampNs asked_ns = 0;
@@ -110,8 +117,9 @@ class TransformFeed {
   std::unordered_map<std::string, Frame> frames_;  // no more than the buffer forgets; places stay
   std::uint64_t change_ = 1;                       // counts what was added
   mutable Chain from_target_, from_source_;        // buffers of a question
-  std::size_t kept_count_ = 0;
-  bool has_disputed_ = false;
+  std::size_t kept_count_ = 0, max_kept_;
+  std::set<std::string> senders_;
+  bool has_disputed_ = false, has_apart_ = false;
   std::atomic<std::uint64_t> unusable_{0}, times_forgotten_{0};
   std::map<std::string, std::string> only_unusable_;  // per child frame that has had no usable one: what was wrong
   std::set<std::string> told_;
@@ -119,10 +127,16 @@ class TransformFeed {
 
   const Frame* frameOf(const std::string& name) const;
   Frame* roomFor(const std::string& name);
-  bool goesBack(const geometry_msgs::TransformStamped& transform) const;
+  const std::string* senderOf(const std::string& name);
+  enum class Jump : std::uint8_t { NONE, LOOP, TWO_SENDERS };
+  Jump jumpOf(const geometry_msgs::TransformStamped& transform, const std::string& sender) const;
+  void forget(Frame& frame);
+  void forgetAllOf(const std::string& sender);
   static bool isThere(const Frame& frame, const Sent& sent);
   void dispute(const geometry_msgs::TransformStamped& transform, Frame& frame);
   const Frame* disputedOnWay() const;
+  const Frame* firstApart() const;
+  static Sent between(const Frame& frame, StampNs stamp_ns);
   static const Frame* newestParentOf(const Frame& frame);
   static std::map<StampNs, Sent>::const_iterator after(const Frame& frame, StampNs stamp_ns);
   static const Frame* parentAt(const Frame& frame, StampNs stamp_ns);

@@ -224,8 +224,8 @@ void TransformWindow::feedUntil(const ros::Time& at) {
     // Where the meshes never go back, its turn comes all the same.
     const ros::Time recorded = next_->getTime();
     const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);
-    if (waiting_ && feed_.clears(*waiting_, false) && !due) return;
-    if (waiting_) feed_.add(*waiting_, false);
+    if (waiting_ && feed_.clears(*waiting_, false, next_->getCallerId()) && !due) return;
+    if (waiting_) feed_.add(*waiting_, false, next_->getCallerId());
     waiting_.reset();
   }
 }

@@ -76,6 +76,7 @@ struct BagReplay::Run {
   std::optional<LookAheadScore> look_ahead;
   std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one message
   std::map<std::string, std::size_t> frames_of_topic;
+  std::map<std::string, std::uint64_t> passed_over;  // messages that are of no body
   BagReplaySummary summary;
   std::set<std::string> complained;
   bool lacked_transform = false;
@@ -170,9 +171,22 @@ struct BagReplay::Run {
     const std::int64_t now_ns = static_cast<std::int64_t>(at.toNSec());
     ++summary.mesh_messages;
     drain(at);  // what waited for other bodies until now gives up first
-    pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns, message.getMD5Sum()});
+    const bool is_known = meshTypeProblem(message.getDataType(), message.getMD5Sum()).empty();
+    pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns, message.getMD5Sum(),
+                         is_known ? "" : message.getMessageDefinition()});
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(at);
+  }
+
+  void meshes(const std::vector<std::size_t>& bodies, const rosbag::MessageInstance& message,
+              const std::vector<std::uint8_t>& bytes) {
+    bool is_of_none = true;
+    for (const std::size_t body : bodies) {
+      const std::uint64_t before = pipeline.passedOver(body);
+      mesh(body, message, bytes);
+      is_of_none = is_of_none && pipeline.passedOver(body) > before;
+    }
+    if (is_of_none) ++passed_over[message.getTopic()];
   }
 };
 
@@ -194,6 +208,12 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   chooseMapTopic();
   bool found = false, named = false;
   std::vector<std::string> wanted, there;
+  std::string refused;
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) {
+    if (!findMeshType(c->datatype)) continue;
+    const std::string problem = meshTypeProblem(c->datatype, c->md5sum, c->msg_def);
+    if (!problem.empty()) refused += "; " + c->topic + ": " + problem;
+  }
   for (const BodyConfig& body : config_.bodies) {
     if (body.isRigid()) continue;
     found |= topics_.count(absolute(body.topic)) > 0;
@@ -203,7 +223,7 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   for (const auto& [topic, type] : topics_) there.push_back(topic + " (" + type + ")");
   if (!found) {
     throw std::runtime_error(path_ + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
-                             "; the bag has " + (there.empty() ? "no messages" : listOf(there)));
+                             "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused);
   }
 }
 
@@ -279,7 +299,7 @@ std::string BagReplay::firstMeshTopic(const std::string& bag, const std::string&
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
     if (c->topic == absolute(clouds) || isMonitorsMarkers(c->topic, types)) continue;
-    if (meshTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
+    if (meshTypeProblem(c->datatype, c->md5sum, c->msg_def).empty()) return c->topic;
   }
   return "";
 }
@@ -296,6 +316,14 @@ void BagReplay::tellMissing(Run& run) const {
     run.complain(
         "the bag has neither /tf nor /tf_static; record them with the meshes, or set fixed_frame to the frame "
         "that the messages name");
+  }
+  for (std::size_t b = 0; b < run.summary.mesh_topics.size(); ++b) {
+    const std::string only = run.pipeline.onlyPassedOver(b);
+    if (!only.empty()) run.complain(run.sourceOf(b) + ": " + only);
+  }
+  for (const auto& [topic, count] : run.passed_over) {
+    run.summary.not_looked_at.push_back(std::to_string(count) + " messages of other markers on " + topic +
+                                        " were passed over");
   }
   for (const std::string& sentence : {unusedMap(run.summary, may_use_map), unheardMeshes(run.summary)}) {
     if (!sentence.empty()) run.summary.not_looked_at.push_back(sentence);
@@ -340,9 +368,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     }
     transforms.feedUntil(at);
     for (const std::string& line : run.feed.takeComplaints()) run.complain("tf: " + line);
-    if (is_mesh) {
-      for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
-    }
+    if (is_mesh) run.meshes(bodies->second, m, bytes);
     const bool is_map = bag_maps && m.getTopic() == map_topic;
     if (is_map && !std::exchange(first_is_taken, false)) run.mapMessage(m);
     run.placeCloud(at);

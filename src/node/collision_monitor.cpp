@@ -88,20 +88,22 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
   frames_handed_over += message.object.type != nullptr;
-  // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
-  if (!enabled && !pipeline.isStatic(body)) {
+  // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
+  // voxels are followed by where the bodies were.
+  if (!enabled && !pipeline.isStatic(body) && !config.ownsVoxels()) {
     ++disabled_frames[body];
     return;
   }
-  if (body == config.monitor.clock_body) state.frameCame(now_ns);
+  if (body == config.monitor.clock_body && enabled) state.frameCame(now_ns);
   message.receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   message.arrival_ns = now_ns;
   queue.push(body, std::move(message));
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
-void CollisionMonitor::Impl::onTransforms(const ShapeShifter& bytes, bool is_static) try {
-  if (const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(bytes))) feed.add(*message, is_static);
+void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
+  const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(*event.getConstMessage()));
+  if (message) feed.add(*message, is_static, event.getPublisherName());
   for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
   tellLost(is_static ? "/tf_static" : "/tf", error);
@@ -133,8 +135,9 @@ void CollisionMonitor::Impl::subscribe() {
   }
   const auto listenTo = [&](const std::string& topic, bool is_static) {
     ros::SubscribeOptions options;
-    options.init<ShapeShifter>(topic, SUBSCRIBER_QUEUE,
-                               [this, is_static](const ShapeShifter::ConstPtr& m) { onTransforms(*m, is_static); });
+    using Event = const ros::MessageEvent<const ShapeShifter>&;
+    options.initByFullCallbackType<Event>(topic, SUBSCRIBER_QUEUE,
+                                          [this, is_static](Event event) { onTransforms(event, is_static); });
     options.md5sum = ros::message_traits::md5sum<tf2_msgs::TFMessage>();
     options.datatype = ros::message_traits::datatype<tf2_msgs::TFMessage>();
     options.transport_hints = ros::TransportHints().tcpNoDelay();

@@ -83,7 +83,7 @@ struct CollisionMonitor::Impl {
   // Input thread.
   void subscribe();
   void onMesh(std::size_t body, MeshMessage message);
-  void onTransforms(const topic_tools::ShapeShifter& bytes, bool is_static);
+  void onTransforms(const ros::MessageEvent<const topic_tools::ShapeShifter>& event, bool is_static);
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
 
   // Service thread.

@@ -4,6 +4,7 @@
 
 #include "input/short_text.h"
 #include "input/steady_clock.h"
+#include "output/advice.h"
 
 namespace dccd {
 
@@ -53,10 +54,11 @@ bool MonitorLog::isSilenceDue(std::int64_t now_ns) {
 void MonitorLog::hintAt(std::string silence, const MonitorPipeline& pipeline) {
   std::string text = std::move(silence);
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
-    if (pipeline.hint(b).empty()) continue;
+    const std::string hint = joined(pipeline.hint(b), pipeline.onlyPassedOver(b));
+    if (hint.empty()) continue;
     const BodyConfig& body = config_.bodies[b];
     const std::string source = body.isRigid() ? "body '" + body.body.name + "'" : topicOf(b);
-    text += (text.empty() ? "" : "; ") + source + ": " + pipeline.hint(b);
+    text += (text.empty() ? "" : "; ") + source + ": " + hint;
   }
   if (text.empty()) told_hint_.clear();
   if (!text.empty() && text != told_hint_ && isDue("hint")) ROS_WARN_STREAM(name_ << ": " << (told_hint_ = text));

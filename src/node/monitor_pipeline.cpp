@@ -29,6 +29,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   refused_.resize(config_.bodies.size());
   checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
+  passed_over_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {
@@ -72,7 +73,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
            "there is not enough memory for this message of " + std::to_string(bytes) + " bytes");
   };
   if (message.no_memory > 0) return noMemory(message.no_memory);
-  const std::string type_problem = meshTypeProblem(message.datatype, message.md5);
+  const std::string type_problem = meshTypeProblem(message.datatype, message.md5, message.definition);
   if (!type_problem.empty()) return refuse(StepStatus::BAD_MESSAGE, type_problem);
   try {
     waiting.mesh =
@@ -81,6 +82,10 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     if (topology_filter_) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
+  } catch (const PassedOver& other) {
+    ++passed_over_[body].messages;
+    passed_over_[body].newest = shortText(other.what());
+    return;
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {
@@ -145,7 +150,9 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
     if (!isHopeless(body)) return false;
     monitor_->dropSteps(StepStatus::NO_BODY, missing(body));
   }
+  if (resting_) monitor_->dropSteps(StepStatus::DISABLED, "the monitor is disabled");
   if (!monitor_->next(now_ns, outcome)) return false;
+  if (resting_) return true;
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);
@@ -165,6 +172,7 @@ StatsContext MonitorPipeline::counters() const {
   context.weld_changes = weld_changes_;
   context.transforms_unusable = transforms_.unusable();
   context.wrong_row_steps = wrong_row_steps_;
+  for (const auto& body : passed_over_) context.markers_passed_over += body.messages;
   context.parameter_hash = config_.hash();
   context.promises = promises_.promises();
   context.promises_broken = promises_.brokenPromises();
@@ -216,6 +224,12 @@ Outcome MonitorPipeline::checkNow() {
   nameMissing(outcome);
   nameUnwatched(outcome);
   return outcome;
+}
+
+std::string MonitorPipeline::onlyPassedOver(std::size_t body) const {
+  const OtherMarkers& others = passed_over_[body];
+  if (checked_[body] || others.messages == 0) return {};
+  return "all messages so far, " + std::to_string(others.messages) + ", are passed over: " + others.newest;
 }
 
 std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }

@@ -62,6 +62,10 @@ class MonitorPipeline {
   bool nextOutcome(std::int64_t now_ns, Outcome& outcome);
   /// Something waits for tf or for other bodies, so that nextOutcome() is worth calling again without new input.
   bool waiting() const;
+  /// While it rests no step is computed, and outcomes say nothing but that. Where bodies are, and which voxels are
+  /// their own, is followed all the same: what maps show meanwhile could not be told from the bodies afterwards.
+  void rest(bool resting) { resting_ = resting; }
+  bool isResting() const { return resting_; }
   /// End of input: whatever still waits is given up at the next call of nextOutcome().
   void finish();
   /// Forgets all frames but those of static bodies, also where they wait. After RESET triangle soups are welded anew,
@@ -116,6 +120,10 @@ class MonitorPipeline {
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
+  /// Of the body's topic: messages of markers that are none of the mesh.
+  std::uint64_t passedOver(std::size_t body) const { return passed_over_[body].messages; }
+  /// That nothing else came, and what did; empty: something else did, or nothing at all.
+  std::string onlyPassedOver(std::size_t body) const;
   /// What was taken for granted to place the map, since the last call; for the log. Empty: nothing was.
   std::string takeMapNote() { return std::exchange(map_note_, {}); }
   /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h); empty: nothing
@@ -186,6 +194,12 @@ class MonitorPipeline {
   std::optional<LoadedMap> placed_map_;
   bool frame_answered_ = false;  // a step was answered in it
   std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0;
+  bool resting_ = false;
+  struct OtherMarkers {
+    std::uint64_t messages = 0;
+    std::string newest;
+  };
+  std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;
 
   void loadFiles();

@@ -60,6 +60,7 @@ void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
     state.setEnabled(enabled);
     state.asked("~enable was called");
     return ask([this, on = request.data] {
+      pipeline.rest(!on);
       resetNow(StepStatus::DISABLED);
       return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
     });

@@ -111,7 +111,7 @@ std::vector<AwaitedTopic> CollisionMonitor::Impl::silentTopics() {
   heard.resize(config.bodies.size());
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (!mesh_subscriptions[b]) continue;
-    const std::uint64_t frames = pipeline.monitor().counters(b).received + queue.size(b);
+    const std::uint64_t frames = pipeline.monitor().counters(b).received + pipeline.passedOver(b) + queue.size(b);
     if (frames != heard[b].frames) heard[b] = {frames, now_ns};
     if (frames > 0 && (pipeline.isStatic(b) || secondsBetween(heard[b].at_ns, now_ns) < patience_s)) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
@@ -267,7 +267,9 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   accountDropped();
   if (holdsStaticFrames()) state.staticInUse(static_frames);
   Outcome outcome;
-  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
+  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) {
+    if (!pipeline.isResting()) publishOutcome(outcome);
+  }
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
   tellComplaints();
   const std::string surprise = recorder.takeSurprise();

@@ -188,7 +188,7 @@ DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& lim
     std::vector<char> data(static_cast<std::size_t>(size));
     file.seekg(0);
     if (!file.read(data.data(), size)) throw OctomapError("the file cannot be read");
-    const OctomapHeader header = parseOctomapHeader(data.data(), data.size());
+    const OctomapHeader header = parseOctomapFileHeader(data.data(), data.size());
     if (!header.present) throw OctomapError("the file has no header of a .bt or .ot file");
     checkResolution(header.resolution);
     return decode(header, reinterpret_cast<const unsigned char*>(data.data()), data.size(), header.resolution, limits);

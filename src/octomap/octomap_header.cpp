@@ -1,6 +1,7 @@
 #include "octomap/octomap_header.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <sstream>
 
@@ -64,6 +65,24 @@ OctomapHeader parseOctomapHeader(const char* data, std::size_t size) {
     return header;
   }
   throw OctomapError("octomap header: it ends before its line 'data'");
+}
+
+OctomapHeader parseOctomapFileHeader(const char* data, std::size_t size) {
+  constexpr std::size_t LENGTH = sizeof(std::int32_t) + sizeof(double) + sizeof(std::uint32_t);
+  constexpr std::int32_t OCTREE = 3;
+  OctomapHeader header = parseOctomapHeader(data, size);
+  std::int32_t type = 0;
+  if (header.present || size < LENGTH) return header;
+  std::memcpy(&type, data, sizeof type);
+  if (type != OCTREE) return header;
+  std::uint32_t nodes = 0;
+  std::memcpy(&header.resolution, data + sizeof type, sizeof header.resolution);
+  std::memcpy(&nodes, data + LENGTH - sizeof nodes, sizeof nodes);
+  header.present = header.binary = true;
+  header.id = "OcTree";
+  header.empty = nodes == 0;
+  header.length = LENGTH;
+  return header;
 }
 
 }  // namespace dccd

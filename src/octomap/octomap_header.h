@@ -17,5 +17,7 @@ struct OctomapHeader {
 
 /// Not present where the data do not begin like one. Throws OctomapError for a header that is cut off or lacks a field.
 OctomapHeader parseOctomapHeader(const char* data, std::size_t size);
+/// The same of a file: before OctoMap 1.0 a .bt file began with 16 bytes (the number 3, the resolution, the size).
+OctomapHeader parseOctomapFileHeader(const char* data, std::size_t size);
 
 }  // namespace dccd

@@ -125,6 +125,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     case StepStatus::TOPOLOGY_CHANGED:
       return "a step needs the same vertices twice: use a tracker, or give topology/file";
     case StepStatus::DUPLICATE:
+      if (reason.find("/clock") != std::string::npos) return "publish /clock first (rosbag play --clock)";
       return "the publisher must stamp every frame anew";
     case StepStatus::VERTEX_COUNT:
       if (reason.compare(0, 10, "parameter ") == 0) return "the vertices are numbered from 0";

@@ -97,6 +97,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   putValue(status, "frames handed over in process", context.frames_handed_over);
   putValue(status, "unusable transforms", context.transforms_unusable);
   putValue(status, "wrong row_steps", context.wrong_row_steps);
+  putValue(status, "messages of other markers", context.markers_passed_over);
   putValue(status, "refused requests for objects", context.requests_refused);
   putValue(status, "maps received", context.maps_received);
   putValue(status, "maps refused", context.maps_refused);

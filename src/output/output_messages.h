@@ -61,9 +61,10 @@ struct StatsContext {
   std::uint64_t maps_received = 0, maps_refused = 0;
   std::uint64_t steps_unpublished = 0;  ///< of which not everything was published
   std::uint64_t transforms_unusable = 0;
-  std::uint64_t requests_refused = 0;    ///< of ~attach, ~detach and ~remove
-  std::uint64_t wrong_row_steps = 0;     ///< clouds of which the data say it
-  std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
+  std::uint64_t requests_refused = 0;     ///< of ~attach, ~detach and ~remove
+  std::uint64_t wrong_row_steps = 0;      ///< clouds of which the data say it
+  std::uint64_t markers_passed_over = 0;  ///< messages of markers that are none of the mesh
+  std::uint64_t frames_handed_over = 0;   ///< by publishers in the same process, never serialised
   std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;
   std::uint64_t promises = 0, promises_broken = 0;  ///< of ~safe_until, since the start

@@ -42,6 +42,12 @@ double positive(double size_m, const std::string& what) {
   throw std::invalid_argument(what + " is " + shown(size_m) + " m; it must be above 0");
 }
 
+/// Some write a sphere of radius 0 for a link that has no surface.
+bool isPoint(const urdf::Collision& collision) {
+  const auto* sphere = dynamic_cast<const urdf::Sphere*>(collision.geometry.get());
+  return sphere && sphere->radius == 0;
+}
+
 class RobotMaker {
  public:
   RobotMaker(const RobotConfig& config, double tolerance_m) : config_(config), tolerance_m_(tolerance_m) {}
@@ -57,10 +63,12 @@ class RobotMaker {
       return std::move(robot_);
     }
     robot_.known = true;
-    for (const std::string& shape : urdf.unread) miss("not watched: " + shape);
     for (const auto& link : urdf.model->links_) robot_.links.push_back(link.first);
     if (!semantic.name.empty()) readSemantic(semantic, *urdf.model);
     findLeftOut();
+    for (const auto& [link, shape] : urdf.unread) {
+      if (!isLeftOut(link)) miss("not watched: " + shape);
+    }
     for (const auto& link : urdf.model->links_) {
       if (!isLeftOut(link.first)) addLink(*link.second, urdf.refused[link.first]);
     }
@@ -120,6 +128,10 @@ class RobotMaker {
       const std::string what = "link '" + link.name + "'" + (i == 0 ? "" : ", collision element " + number);
       if (robot_.parts.size() >= MOST_PARTS) {
         return miss(what + " is not watched: a robot may have " + std::to_string(MOST_PARTS) + " collision elements");
+      }
+      if (isPoint(*link.collision_array[i])) {
+        robot_.excluded.push_back(what + ", a sphere of radius 0");
+        continue;
       }
       try {
         MeshResource mesh = meshOf(*link.collision_array[i], config_.scaleOf(link.name), what);
@@ -199,10 +211,9 @@ class RobotMaker {
       list = quoted(list, link);
     }
     if (!visual_only.empty()) {
-      remark(
-          "not watched, for they have a visual but no collision element (robot/visuals: true takes the visual): "
-          "links " +
-          visual_only);
+      const std::string why = "they have a visual but no collision element (robot/visuals: true takes the visual)";
+      remark("not watched, for " + why + ": links " + visual_only);
+      robot_.excluded.push_back("links " + visual_only + ": " + why);
     }
     if (!bare.empty()) remark("without geometry are links " + bare);
     if (robot_.parts.empty() && robot_.missing.empty()) miss("the robot has no link with a collision element");

@@ -39,19 +39,35 @@ class HeardErrors : public console_bridge::OutputHandler {
   std::string said_;
 };
 
-/// The shapes where no URDF has one, as in a <Link>: nobody would read them. Simulators have shapes of their own.
-void listUnread(const XMLElement& at, const XMLElement& robot, std::vector<std::string>& unread) {
+/// The shapes where no URDF has one, as in a <Link>: nobody would read them. Simulators have shapes of their own, and
+/// what a controller holds against each other is none of a link's surface. `owner`: the link in which they stand.
+void listUnread(const XMLElement& at, const XMLElement& robot, std::string owner, UrdfText& urdf) {
   const std::string name = at.Name();
+  if (name == "link" && at.Parent() == &robot) owner = textOf(at, "name");
   const XMLElement* link = at.Parent()->ToElement();
   const bool of_link = (name == "collision" || name == "visual") && link && std::string(link->Name()) == "link" &&
                        link->Parent() == &robot;
   for (const XMLElement* child = at.FirstChildElement(); child; child = child->NextSiblingElement()) {
     const std::string tag = child->Name();
     if (tag == "geometry" && !of_link) {
-      unread.push_back("a <geometry> in " + placeOf(at) + ", where no URDF has one");
-    } else if (tag != "gazebo") {
-      listUnread(*child, robot, unread);
+      urdf.unread.emplace_back(owner, "a <geometry> in " + placeOf(at) + ", where no URDF has one");
+    } else if (tag != "gazebo" && tag != "self_collision_checking") {
+      listUnread(*child, robot, owner, urdf);
     }
+  }
+}
+
+/// What others say of a shape, as <drake:declare_convex/> does: an element of a namespace, with nothing in it.
+bool isMark(const XMLElement& element) {
+  return std::string(element.Name()).find(':') != std::string::npos && !element.FirstAttribute() &&
+         element.NoChildren();
+}
+
+void dropMarks(XMLElement& collision) {
+  XMLElement* geometry = collision.FirstChildElement("geometry");
+  for (XMLElement *shape = geometry ? geometry->FirstChildElement() : nullptr, *next = nullptr; shape; shape = next) {
+    next = shape->NextSiblingElement();
+    if (isMark(*shape)) geometry->DeleteChild(shape);
   }
 }
 
@@ -94,6 +110,7 @@ std::size_t reduceLink(XMLElement& link, UrdfText& urdf) {
     next = child->NextSiblingElement();
     const std::string tag = child->Name();
     seen = seen || tag == "visual";
+    if (tag == "collision") dropMarks(*child);
     const std::string problem = tag == "collision" ? problemOf(*child) : "";
     if (tag == "collision") ++number;
     if (tag == "collision" && problem.empty()) ++kept;
@@ -124,7 +141,7 @@ UrdfText parseUrdf(const std::string& text, bool visuals) {
   UrdfText urdf;
   tinyxml2::XMLDocument document;
   XMLElement& robot = parseRobotXml(text, document);
-  listUnread(robot, robot, urdf.unread);
+  listUnread(robot, robot, "", urdf);
   std::map<std::string, std::size_t> elements;  // of each link
   for (XMLElement *child = robot.FirstChildElement(), *next = nullptr; child; child = next) {
     next = child->NextSiblingElement();

@@ -5,6 +5,7 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <urdf_model/model.h>
@@ -21,7 +22,8 @@ struct UrdfText {
   urdf::ModelInterfaceSharedPtr model;  ///< its links with their collision elements; its joints are all fixed
   /// By link: collision elements that are no geometry that is known, a clause each. They are not in the model.
   std::map<std::string, std::vector<std::string>> refused;
-  std::vector<std::string> unread;    ///< shapes that are of no link's elements, a clause each
+  /// Shapes that are of no link's elements: the link in which they stand, or none, and a clause.
+  std::vector<std::pair<std::string, std::string>> unread;
   std::set<std::string> visual_only;  ///< links that are seen, but have no collision element
 };
 

@@ -321,6 +321,7 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
     if (m.listener) m.listener->onOutcome(outcome);
   } else {
     without(step.status, step.reason);
+    if (step.status == StepStatus::DISABLED) m.followOwnVoxels(step.stamp_ns);
     if (isSeam(step.status)) {
       m.forgetLast();
       if (!step.to) {  // else it is another body's, which runStep() sees

@@ -1,6 +1,9 @@
 // Which map a step has: the newest one whose own voxels can be told, with the one that is trusted.
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <limits>
+#include <new>
 #include <sstream>
 #include <utility>
 
@@ -14,6 +17,13 @@ namespace {
 // Maps that may wait for the bodies' frames: half a second of a camera's. Of large ones fewer, so that max_map_mb has
 // room for what follows.
 constexpr std::size_t MOST_MAPS_TO_COME = 16, FEWEST_MAPS_TO_COME = 4, MOST_BYTES_TO_COME = std::size_t{32} << 20;
+
+/// Whether both are of one lattice: a publisher may have its resolution as a float. By 10 m from the origin voxels of
+/// the two are 1.2 um apart then at the most.
+bool isSameLattice(const VoxelSurface& a, const VoxelSurface& b) {
+  constexpr double FLOAT_PRECISION = std::numeric_limits<float>::epsilon();
+  return std::abs(a.resolution() - b.resolution()) <= FLOAT_PRECISION * b.resolution();
+}
 
 }  // namespace
 
@@ -94,12 +104,25 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
   }
 }
 
+void Monitor::Impl::followOwnVoxels(StampNs stamp_ns) try {
+  StampNs known_until_ns = stamp_ns;
+  for (const TrackedBody& body : tracked()) {
+    if (!body.holds_always && !body.frames->empty()) {
+      known_until_ns = std::min(known_until_ns, body.frames->newest().stamp_ns);
+    }
+  }
+  takeMaps(known_until_ns);
+} catch (const std::bad_alloc&) {
+  // The maps wait for the next one.
+}
+
 void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked) {
   const VoxelSurface* sure = trusted.surface.get();
-  if (sure && (trusted.frame_id != next.frame_id || sure->resolution() != next.surface->resolution())) {
+  // The one lattice of both is the live map's: a message has all digits of its resolution, a file's header six.
+  if (sure && (trusted.frame_id != next.frame_id || !isSameLattice(*sure, *next.surface))) {
     std::ostringstream problem;
-    problem << "the octomap has voxels of " << next.surface->resolution() << " m in frame '" << next.frame_id
-            << "', and octomap_file of " << sure->resolution() << " m in '" << trusted.frame_id
+    problem << std::setprecision(9) << "the octomap has voxels of " << next.surface->resolution() << " m in frame '"
+            << next.frame_id << "', and octomap_file of " << sure->resolution() << " m in '" << trusted.frame_id
             << "'; used together they must have the same";
     map = ObstacleMap();
     map.problem = problem.str();

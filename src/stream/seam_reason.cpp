@@ -32,7 +32,9 @@ void addSize(const Positions& positions, std::ostringstream& text) {
 }
 
 std::string sizeOf(const Topology& topology) {
-  return std::to_string(topology.vertexCount()) + " vertices and " + std::to_string(topology.faces().size()) + " faces";
+  const std::string parts = topology.hasFaces() ? std::to_string(topology.faces().size()) + " faces"
+                                                : std::to_string(topology.edges().size()) + " edges";
+  return std::to_string(topology.vertexCount()) + " vertices and " + parts;
 }
 
 }  // namespace
@@ -57,12 +59,14 @@ std::string seamReason(StepStatus status, const MeshFrame& before, const MeshFra
     case StepStatus::TOPOLOGY_CHANGED:
       text << "the mesh has " << sizeOf(*after.topology) << ", the last one had " << sizeOf(*before.topology);
       if (after.topology->vertexCount() == before.topology->vertexCount() &&
-          after.topology->faces().size() == before.topology->faces().size()) {
+          after.topology->faces().size() == before.topology->faces().size() &&
+          after.topology->edges().size() == before.topology->edges().size()) {
         text << ", joined otherwise";
       }
       break;
     case StepStatus::DUPLICATE:
-      text << "the stamp is that of the last frame";
+      text << (after.stamp_ns == 0 ? "there is no stamp, and no /clock yet by which to tell the time of receipt"
+                                   : "the stamp is that of the last frame");
       break;
     default:
       break;

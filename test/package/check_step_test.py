@@ -62,6 +62,16 @@ class CheckStepTest(FolderTestCase):
         self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(-0.1)), 0)
         self.assertIn('exact: proved, something touches anew', self.said)
 
+    def test_the_order_of_a_shell_is_refused(self):
+        for name, z in (('1', 0.3), ('2', 0.2), ('10', 0.1)):
+            write(self.folder / (name + '.ply'), sheet(0) + sheet(z), self.FACES)
+        one, two, ten = (self.folder / (name + '.ply') for name in ('1', '2', '10'))
+        done = run(TOOL, one, ten, two)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('10.ply stands before %s: the numbers in the names go neither up nor down' % two, done.stderr)
+        for order in ((one, two, ten), (ten, two, one), (one, two, one)):
+            self.assertEqual(run(TOOL, *order).returncode, 0, order)
+
     def refused(self, words, *arguments):
         self.assertEqual(self.check(*arguments), NOT_PROVED, self.said)
         self.assertIn('not proved', self.said)

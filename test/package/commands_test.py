@@ -168,7 +168,7 @@ class CommandsTest(unittest.TestCase):
         given = dict(re.findall(r'(\w+):=(\S+)', command))
         preset = re.search(r'(cdcpd|trackdlo|fabric_simulator|octomap_server|depth_camera)\.launch', command)
         kind, topic, rows, cols, frame = {
-            'cdcpd': ('cloud', '/cdcpd/output', 20, 20, 'world'), 'trackdlo': ('cloud', '/trackdlo/results_pc', 1, 40, 'world'),
+            'cdcpd': ('cloud', '/cdcpd/tracker_points', 20, 20, 'world'), 'trackdlo': ('cloud', '/trackdlo/results_pc', 1, 40, 'world'),
             'fabric_simulator': ('markers', '/fabric_markers', 8, 8, 'world'),
             'octomap_server': ('grid', '/mesh', 10, 10, 'map'),
             'depth_camera': ('camera', '/mesh', 10, 10, 'world')}.get(preset and preset.group(1), ('grid', '/mesh', 10, 10, 'world'))

@@ -152,6 +152,12 @@ class LaunchTest(unittest.TestCase):
                 added = self.parameters(preset, self.file('max_step_s: 7.0\n'), 'accuracy:=conservative', 'num_threads:=2')
                 self.assertEqual(added, {**plain, 'max_step_s': 7.0})
 
+    def test_a_rope_of_cdcpd_has_no_rows(self):
+        found = self.parameters('presets/cdcpd.launch', 'topology:=polyline')
+        self.assertEqual(found['topology/source'], 'polyline')
+        self.assertNotIn('topology/rows', found)
+        self.assertEqual(self.parameters('presets/cdcpd.launch', 'topology:=grid')['topology/rows'], 20)
+
     def test_demo(self):
         shown = {'markers/mesh': True, 'markers/obstacle_m': 1.0}
         found = self.parameters('demo.launch')

@@ -139,7 +139,7 @@ class ExamplesTest(PythonTestCase):
         t0, _ = two_triangles()
         for i in range(5):
             t0[3:, 2] = 1 - .4 * i
-            meshio.write(frames / ('%02d.ply' % i), meshio.Mesh(t0, [('triangle', FACES.astype('i4'))]))
+            meshio.write(frames / ('%d.ply' % (8 + i)), meshio.Mesh(t0, [('triangle', FACES.astype('i4'))]))
         lines = self.run_example('contacts_over_time.py', frames, self.folder / 'contacts.png', 10)
         self.assertEqual(len(lines), 4)
         self.assertEqual(lines[0], '0.100 s: proved, nothing touches')

@@ -171,7 +171,7 @@ TEST_F(Cdcpd, ClothInTheCamerasOpticalFrame) {
   const auto tf = placeCamera(frame);
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/cdcpd/octomap_binary", true);
   map.publish(tableMap());
-  const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/cdcpd/output");
+  const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/cdcpd/tracker_points");
   drop(0.1, -0.02, [&](double z) {
     Positions positions = grid(20, 20, 0.02, z);
     toOpticalFrame(positions);

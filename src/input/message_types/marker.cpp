@@ -53,9 +53,16 @@ MarkerView viewOfMarker(const visualization_msgs::Marker& message) {
   return marker;
 }
 
-Markers readOne(WireReader& wire, const std::string&) { return {readMarker(wire)}; }
+Markers alone(MarkerView marker) {
+  marker.is_message = true;
+  return {marker};
+}
 
-Markers viewOfOne(const visualization_msgs::Marker& message, const std::string&) { return {viewOfMarker(message)}; }
+Markers readOne(WireReader& wire, const std::string&) { return alone(readMarker(wire)); }
+
+Markers viewOfOne(const visualization_msgs::Marker& message, const std::string&) {
+  return alone(viewOfMarker(message));
+}
 
 Markers readArray(WireReader& wire, const std::string&) {
   const std::size_t count = readCountOfMarkers(wire);

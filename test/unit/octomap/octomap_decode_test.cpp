@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <random>
 #include <set>
@@ -109,6 +110,31 @@ std::vector<Stream> streamsOf(Tree& tree) {
     }
   }
   return streams;
+}
+
+// As OctoMap wrote them before 1.0, and liboctomap still reads them.
+TEST(OctomapDecode, AFileOfBeforeHeadersIsRead) {
+  octomap::OcTree tree(0.05);
+  paint(tree, 9);
+  tree.toMaxLikelihood();
+  std::ostringstream out;
+  const std::int32_t type = 3;
+  const double resolution = tree.getResolution();
+  const auto nodes = static_cast<std::uint32_t>(tree.size());
+  out.write(reinterpret_cast<const char*>(&type), sizeof type);
+  out.write(reinterpret_cast<const char*>(&resolution), sizeof resolution);
+  out.write(reinterpret_cast<const char*>(&nodes), sizeof nodes);
+  tree.writeBinaryData(out);
+  const std::string path = (std::filesystem::temp_directory_path() / "dccd_before_headers.bt").string();
+  std::ofstream(path, std::ios::binary) << out.str();
+  octomap::OcTree theirs(path);
+  const DecodedOctomap map = readOctomapFile(path);
+  EXPECT_EQ(map.resolution_m, 0.05);
+  EXPECT_EQ(sorted(map.occupied), leavesOf(theirs, true));
+  EXPECT_GT(map.occupied.size(), 100u);
+  std::ofstream(path, std::ios::binary) << out.str().substr(0, out.str().size() - 1);
+  EXPECT_NE(test::said<OctomapError>([&] { readOctomapFile(path); }).find("data end"), std::string::npos);
+  std::filesystem::remove(path);
 }
 
 template <class Tree>

@@ -241,7 +241,11 @@ TEST_F(ObjGrammar, Capitals) {
   for (const std::string word : {"F", "V", "L", "G", "FO", "Curv"}) expectLine5(word + " 1 2 3\n", "small letters");
 }
 
-TEST_F(ObjGrammar, LinesOfNumbers) { expectLine5("3 2 4\nf 1 2 3\nf 3 2 4\n", "'3'"); }
+TEST_F(ObjGrammar, LinesOfNumbers) {
+  expectLine5("3 2 4\nf 1 2 3\nf 3 2 4\n", "'3'");
+  const std::string said = error("a.obj", "648 216\nv 0 0 0\n");
+  EXPECT_NE(said.find("'648' begins the first line, where an OBJ file has 'v', 'f' or 'l'"), std::string::npos) << said;
+}
 
 TEST_F(ObjGrammar, UnknownKeywords) {
   const MeshFile mesh = faces("face 1 2 3\nf 1 2 3\nf1 2 3\nf 3 2 4\n");
@@ -770,7 +774,7 @@ TEST_F(DaeGrammar, Lines) {
     return two() + "<lines count=\"1\">" + line + "<p>" + p + "</p></lines>";
   };
   expectTwo(readDae(dae(lines("1 2"))), "the edge of a face");
-  expectUnchecked(readDae(dae(lines("0 3"))), {2}, "polygon 2 of the scene");
+  expectUnchecked(readDae(dae(lines("0 3"))), {2}, "polygon 2 of the scene, a segment of <lines> in line ");
 }
 
 TEST_F(DaeGrammar, WhatIsRefused) {

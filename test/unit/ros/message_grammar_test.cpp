@@ -424,6 +424,78 @@ TEST_F(MarkerGrammar, SeveralLists) {
   EXPECT_EQ(read(two).dropped_faces, 0u) << "one that is asked for is alone";
 }
 
+TEST_F(MarkerGrammar, NamespacesInTurn) {
+  visualization_msgs::Marker other = marker();
+  other.ns = "guide";
+  read(marker());
+  const std::string said = refusalOf(other);
+  EXPECT_TRUE(mentions(said, "('cloth', 2) and with ('guide', 2) come in turn")) << said;
+  EXPECT_TRUE(mentions(said, "name it by marker/namespace")) << said;
+  EXPECT_EQ(refusalOf(marker()), said) << "which of the two is the mesh is not known from then on";
+  anew();
+  visualization_msgs::MarkerArray one, two;
+  one.markers = {marker()};
+  two.markers = {other};
+  read(one);
+  EXPECT_TRUE(mentions(refusalOf(two), "come in turn")) << "arrays, too";
+  anew();
+  one.markers = {marker(), other};
+  EXPECT_EQ(read(one).dropped_faces, 1u) << "one array is one frame";
+  EXPECT_EQ(read(one).dropped_faces, 1u);
+}
+
+TEST_F(MarkerGrammar, IdsInTurn) {
+  visualization_msgs::Marker other = marker();
+  other.id = 7;
+  const DecodedMesh first = read(marker());
+  EXPECT_EQ(read(other).topology, first.topology) << "numbered anew";
+  const std::string said = refusalOf(marker());
+  EXPECT_TRUE(mentions(said, "('cloth', 7) and with ('cloth', 2) come in turn")) << said;
+  EXPECT_TRUE(mentions(said, "name it by marker/id")) << said;
+  EXPECT_EQ(refusalOf(other), said);
+}
+
+TEST_F(MarkerGrammar, WhatIsPassedOver) {
+  const auto isPassedOver = [&](const auto& message) {
+    try {
+      read(message);
+    } catch (const PassedOver&) {
+      return true;
+    } catch (const MeshError&) {
+    }
+    return false;
+  };
+  visualization_msgs::Marker other = marker(), gone = marker(), arrow = marker();
+  other.ns = "guide";
+  gone.action = visualization_msgs::Marker::DELETEALL;
+  arrow.type = visualization_msgs::Marker::ARROW;
+  arrow.id = 3;
+  EXPECT_FALSE(isPassedOver(arrow)) << "nothing of this topic is a mesh yet";
+  read(marker());
+  EXPECT_TRUE(isPassedOver(arrow)) << "drawn besides";
+  arrow.id = marker().id;
+  EXPECT_FALSE(isPassedOver(arrow)) << "in the place of the mesh";
+  EXPECT_TRUE(isPassedOver(gone));
+  EXPECT_FALSE(isPassedOver(other)) << "two meshes, or is it one?";
+  anew();
+  config.marker_namespace = "cloth";
+  visualization_msgs::MarkerArray none, others;
+  others.markers = {other, other};
+  EXPECT_TRUE(isPassedOver(other));
+  EXPECT_TRUE(isPassedOver(others));
+  EXPECT_FALSE(isPassedOver(none)) << "a tracker that sees nothing";
+  EXPECT_EQ(read(marker()).positions.size(), 3u);
+  EXPECT_TRUE(isPassedOver(other));
+  EXPECT_EQ(read(marker()).positions.size(), 3u) << "what others say contradicts nothing";
+  anew();
+  config.marker_id = 2;
+  other.ns = "cloth";
+  other.id = 7;
+  EXPECT_EQ(read(marker()).positions.size(), 3u);
+  EXPECT_TRUE(isPassedOver(other));
+  EXPECT_EQ(read(marker()).positions.size(), 3u);
+}
+
 // --- ropes as markers
 
 struct RopeGrammar : MarkerGrammar {
@@ -460,6 +532,21 @@ TEST_F(RopeGrammar, Strips) {
   EXPECT_EQ(read(strip({b, b, c, d})).topology, mesh.topology) << "the same rope in motion";
   EXPECT_TRUE(mentions(refusalOf(strip({a})), "has 1 point, and a rope needs 2"));
   EXPECT_TRUE(mentions(refusalOf(strip({})), "('rope', 0, type 4 without points)"));
+}
+
+TEST_F(RopeGrammar, PointsThatRepeat) {
+  const Edges by_one = {{0, 1}, {1, 4}, {4, 5}};
+  const DecodedMesh mesh = read(strip({a, b, b, b, c, d}));
+  EXPECT_EQ(mesh.topology->edges(), by_one) << "three that are one; else those before and after touch there";
+  EXPECT_EQ(mesh.positions.size(), 6u) << "each point of the message is a vertex";
+  EXPECT_EQ(read(strip({a, c, c, c, d, e})).topology, mesh.topology) << "in motion";
+  EXPECT_EQ(read(strip({a, b, c, d, d, e})).topology->edges().size(), 5u) << "two are neighbours anyway";
+  EXPECT_EQ(read(strip({a, b, c, e, e, e, e})).topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}})) << "at the end";
+  EXPECT_EQ(read(strip({a, a, a, b, c, a, a, a})).topology->edges(), (Edges{{0, 3}, {0, 4}, {3, 4}})) << "a loop";
+  anew();
+  config.source = TopologySource::POLYLINE;
+  EXPECT_EQ(read(rope(MARKER_POINTS, {a, b, b, b, c, d})).topology->edges(), by_one);
+  EXPECT_TRUE(mentions(refusalOf(rope(MARKER_POINTS, {a, a, a})), "the lines have no length"));
 }
 
 TEST_F(RopeGrammar, ClosedStrips) {
@@ -579,6 +666,8 @@ TEST_F(PoseArrayGrammar, Positions) {
   EXPECT_EQ(mesh.topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}}));
   EXPECT_NE(read(poses({a, b, c})).topology, mesh.topology) << "another number is another topology";
   EXPECT_FALSE(read(poses({a, {NOT_A_NUMBER, 0, 0}, c})).positions[1].allFinite()) << "unchecked";
+  EXPECT_EQ(read(poses({a, b, b, b, c})).topology->edges(), (Edges{{0, 1}, {1, 4}}));
+  EXPECT_TRUE(mentions(refusalOf(poses({a, a, a})), "all points of a line are one"));
   EXPECT_TRUE(mentions(refusalOf(poses({a})), "VERTEX_COUNT: 1 points, but a polyline needs 2"));
   EXPECT_TRUE(mentions(refusalOf(poses({})), "there are no vertices"));
   anew();

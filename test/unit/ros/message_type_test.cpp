@@ -70,6 +70,25 @@ TEST(MessageType, AToyIsNamedWhereverTypesAre) {
   EXPECT_EQ(readConfig(tree).bodies.at(0).input.type, "toy");
 }
 
+// The one of Fuerte has no DELETEALL: another md5, and the same bytes.
+TEST(MessageType, AnOlderDefinitionOfTheSameLayoutIsRead) {
+  for (const char* type : {"visualization_msgs/Marker", "visualization_msgs/MarkerArray"}) {
+    std::string older = findMeshType(type)->definition;
+    const std::size_t at = older.find("uint8 DELETEALL=3");
+    ASSERT_NE(at, std::string::npos);
+    older.erase(at, older.find('\n', at) - at);
+    EXPECT_EQ(meshTypeProblem(type, "18326976df9d29249efc939e00342cde", older), "");
+    EXPECT_NE(meshTypeProblem(type, "18326976df9d29249efc939e00342cde"), "") << "unknown";
+    std::string other = older;
+    other.replace(other.find("duration lifetime"), 17, "float64 lifetime");
+    EXPECT_NE(meshTypeProblem(type, "0", other).find("lifetime' is known"), std::string::npos)
+        << meshTypeProblem(type, "0", other);
+    EXPECT_NE(meshTypeProblem(type, "0", "uint8 X=1\n"), "") << "no field";
+    EXPECT_NE(meshTypeProblem(type, "0", "MSG: a/b\na/b b\n"), "") << "one that goes round";
+  }
+  EXPECT_NE(meshTypeProblem("shape_msgs/Mesh", "0", "shape_msgs/Mesh m\n"), "") << "one that goes round";
+}
+
 TEST(MessageType, OfAnObjectOfAnotherTypeThereIsNone) {
   const auto message = square();
   const TypedMesh typed{findMeshType(TOY_TYPE), message};

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "node/bag_reading.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -92,6 +93,79 @@ TEST_F(TransformFeedTest, AFrameThatWasElsewhereAtAStampBeginsAnew) {
   EXPECT_TRUE(feed.add(turned("finger", 1, 1.25, 5, "arm"), false)) << "of another parent";
   feed.add(turned("finger", 1, 1.5, 5, "arm"), false);
   EXPECT_FALSE(feed.clears(turned("finger", std::numeric_limits<double>::quiet_NaN(), 1.25, 5), false)) << "left out";
+}
+
+// Two clocks 1.5 s apart on one frame that nobody asks for cost that frame alone.
+TEST_F(TransformFeedTest, TwoPublishersOfAFrameForgetThatFrameAlone) {
+  Eigen::Isometry3d pose;
+  std::string reason;
+  for (int k = 0; k < 50; ++k) {
+    const double now_s = 10 + 0.1 * k;
+    feed.add(turned("finger", 1, now_s, k), false, "/arm");
+    feed.add(turned("tip", 1, now_s, 1, "spinner"), false, "/arm");
+    feed.add(turned("spinner", 1, now_s, 1), false, "/one");
+    EXPECT_FALSE(feed.clears(turned("spinner", 1, now_s - 1.5, 5), false, "/two"));
+    EXPECT_EQ(feed.add(turned("spinner", 1, now_s - 1.5, 5), false, "/two"), true) << k;
+  }
+  EXPECT_EQ(feed.timesForgotten(), 0u);
+  ASSERT_TRUE(feed.lookup("world", "finger", 10050000000, pose, reason)) << reason;
+  EXPECT_NEAR(pose.translation().x(), 0.5, 1e-12) << "all of it is there, by tf2";
+  std::vector<TransformFeed::NewParent> changes;
+  EXPECT_EQ(feed.stampsBetween("world", "finger", 10000000000, 14900000000, changes).size(), 48u);
+  EXPECT_TRUE(changes.empty());
+  EXPECT_FALSE(feed.lookup("world", "tip", 14900000000, pose, reason));
+  EXPECT_EQ(
+      reason,
+      "nothing is known of 'spinner' then; what was sent before is forgotten, as the stamps of '/one' and '/two', "
+      "which both send it, are apart");
+  ASSERT_TRUE(feed.lookup("world", "tip", 13400000000, pose, reason)) << reason;
+  EXPECT_EQ(pose.translation().x(), 6) << "of the last stamp, as it was sent";
+  feed.add(turned("spinner", 1, 15, 1), false, "/one");
+  EXPECT_FALSE(feed.lookup("world", "spinner", 14000000000, pose, reason)) << "between two clocks";
+  feed.add(turned("spinner", 1, 15.5, 2), false, "/one");
+  ASSERT_TRUE(feed.lookup("world", "spinner", 15250000000, pose, reason)) << reason;
+  EXPECT_DOUBLE_EQ(pose.translation().x(), 1.5) << "between two of one";
+  ASSERT_TRUE(feed.lookup("spinner", "world", 0, pose, reason)) << reason;
+  EXPECT_EQ(pose.translation().x(), -2) << "the newest";
+  feed.stampsBetween("world", "spinner", 13000000000, 15500000000, changes);
+  EXPECT_FALSE(changes.empty()) << "where it was before that nobody knows";
+}
+
+TEST_F(TransformFeedTest, APublisherWhoseStampsGoBackForgetsWhatItSent) {
+  Eigen::Isometry3d pose;
+  std::string reason;
+  for (const double stamp_s : {10.0, 11.0, 12.0}) {
+    feed.add(turned("finger", 1, stamp_s, 1), false, "/arm");
+    feed.add(turned("hand", 1, stamp_s, 1), false, "/arm");
+    feed.add(turned("camera", 1, stamp_s, 1), false, "/camera");
+  }
+  EXPECT_TRUE(feed.clears(turned("finger", 1, 5, 2), false, "/arm"));
+  EXPECT_TRUE(feed.add(turned("finger", 1, 5, 2), false, "/arm"));
+  EXPECT_TRUE(feed.lookup("world", "camera", 11500000000, pose, reason)) << reason;
+  EXPECT_FALSE(feed.lookup("world", "hand", 11500000000, pose, reason)) << "tf2 still has it";
+  EXPECT_EQ(reason,
+            "nothing is known of 'hand' then; what was sent before is forgotten, as the stamps of '/arm' went back");
+  EXPECT_FALSE(feed.lookup("world", "hand", 0, pose, reason));
+  EXPECT_FALSE(feed.add(turned("hand", 1, 5, 2), false, "/arm")) << "once for all that it sends";
+  EXPECT_TRUE(feed.lookup("world", "hand", 5000000000, pose, reason)) << reason;
+  EXPECT_TRUE(feed.add(turned("camera", 1, 5, 2), false, "/camera"));
+  ASSERT_TRUE(feed.lookup("camera", "finger", 5000000000, pose, reason)) << reason;
+  EXPECT_EQ(pose.translation().x(), 0);
+}
+
+// What the node takes in 10 s analyze_bag takes in 70 s: the transforms of a humanoid, far more slowly than the limit.
+TEST(TransformFeedLimit, IsOfARate) {
+  tf2::BufferCore buffer{TransformWindow::length()};
+  TransformFeed feed(buffer);
+  tf2_msgs::TFMessage message;
+  for (int frame = 0; frame < 45; ++frame) {
+    message.transforms.push_back(turned("link" + std::to_string(frame), 1, 0).transforms[0]);
+  }
+  for (int k = 0; k < 6900; ++k) {
+    for (auto& transform : message.transforms) transform.header.stamp = ros::Time(100 + 0.01 * k);
+    ASSERT_FALSE(feed.add(message, false)) << k;
+  }
+  EXPECT_EQ(feed.timesForgotten(), 0u);
 }
 
 TEST_F(TransformFeedTest, AFrameOnBothTopicsHasNoPlaceUnlessTheyAgree) {

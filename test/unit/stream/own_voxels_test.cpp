@@ -571,6 +571,36 @@ TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
   }
 }
 
+// As the node does it while ~enable is false: the cloth is carried up by 0.3 m and rests there, and maps come all the
+// time. Else all that they showed meanwhile would be in doubt for as long as it rests.
+TEST_F(OwnVoxels, OverStepsThatAreNotWantedWhatIsOwnIsFollowed) {
+  const Cells late_obstacle{{5, 5, 10}};
+  for (const bool obstacle : {false, true}) {
+    start(0.05);
+    hoverAboveFloor();
+    const auto height = [](int k) { return 0.55 + 0.015 * std::min(k, 20); };
+    monitor_->reset(StepStatus::DISABLED);
+    for (int k = 2; k < 40; ++k) {
+      map(k * 100 * MS, slab(1) + voxelsOf(height(k)) + (obstacle && k > 10 ? late_obstacle : Cells()));
+      monitor_->countReceived(0);
+      monitor_->push(0, sheet(k * 100 * MS, height(k)), NOW);
+      monitor_->dropSteps(StepStatus::DISABLED, "a test");
+      Outcome outcome;
+      ASSERT_TRUE(monitor_->next(NOW, outcome));
+      EXPECT_FALSE(outcome.answered);
+    }
+    monitor_->reset(StepStatus::DISABLED);
+    feed(4000 * MS, 0.85);
+    map(4000 * MS, slab(1) + voxelsOf(0.85) + (obstacle ? late_obstacle : Cells()));
+    const Outcome rests = feed(4100 * MS, 0.85);
+    EXPECT_TRUE(assuranceOf(rests).clear()) << describe(assuranceOf(rests));
+    EXPECT_EQ(own(rests), 25u);
+    const Outcome rises = feed(4200 * MS, 1.02);
+    EXPECT_EQ(assuranceOf(rises).touching, obstacle ? Touching::NEW : Touching::NONE) << "one that came meanwhile";
+    expectAddsUp(*monitor_);
+  }
+}
+
 TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {
   ObstacleMap table = mapOf(VOXEL_M, {voxelAt(4, 4, 4)}, 0);
   monitor_->setMapBeside(table);
@@ -586,6 +616,17 @@ TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {
   const Outcome other = feed(300 * MS, 0.55);
   EXPECT_EQ(other.status, StepStatus::NO_MAP);
   EXPECT_NE(other.reason.find("octomap_file of 0.1 m"), std::string::npos) << other.reason;
+
+  const double as_float = static_cast<double>(0.1f);
+  monitor_->setMap(mapOf(as_float, leavesOf(slab(1)), 350 * MS));
+  const Outcome both = feed(400 * MS, 0.55);
+  ASSERT_TRUE(both.obstacle) << both.reason;
+  EXPECT_EQ(both.obstacle->resolution(), as_float) << "the live map's";
+  EXPECT_NE(both.obstacle->leafAt({0.45, 0.45, 0.45}), nullptr);
+  monitor_->setMap(mapOf(VOXEL_M * (1 + 2e-7), leavesOf(slab(1)), 450 * MS));
+  const Outcome apart = feed(500 * MS, 0.55);
+  EXPECT_EQ(apart.status, StepStatus::NO_MAP);
+  EXPECT_NE(apart.reason.find("voxels of 0.10000002 m"), std::string::npos) << apart.reason;
 
   start(0.05);
   feed(0, 0.545);

@@ -145,6 +145,40 @@ TEST_F(RobotModel, WhatOthersWriteBesideSurfacesIsPassedOver) {
       "not watched, for they have a visual but no collision element (robot/visuals: true takes the visual): links "
       "'seen'\n"
       "without geometry are links 'world'\n");
+  EXPECT_EQ(joinedText(robot.excluded),
+            "links 'seen': they have a visual but no collision element (robot/visuals: true takes the visual)\n");
+}
+
+TEST_F(RobotModel, AMarkBesideAShapeIsNoShape) {
+  const std::string mark = "<drake:declare_convex/>", mesh = "<mesh filename='" + ours("pyramid.obj") + "'/>";
+  for (const std::string& geometry : {mesh + mark, mark + mesh}) {
+    const Robot robot = robotFrom(robotOf(link("a", collision(geometry))));
+    EXPECT_EQ(joinedText(robot.missing), "") << geometry;
+    EXPECT_EQ(robot.parts.size(), 1u) << geometry;
+  }
+  const Robot two = robotFrom(robotOf(link("a", collision(mesh + "<drake:capsule radius='1' length='1'/>"))));
+  EXPECT_TRUE(says(two.missing, "has more than one shape")) << "one that has a size is no mark";
+  EXPECT_TRUE(says(robotFrom(robotOf(link("a", collision(mark)))).missing, "has no geometry"));
+}
+
+// A controller's spheres for the robot against itself are none of what a cloth may touch.
+TEST_F(RobotModel, ShapesOfSelfCollisionCheckingAreNoneOfTheLinks) {
+  const std::string spheres =
+      "<self_collision_checking><origin xyz='0 0 0'/><geometry><sphere "
+      "radius='9'/></geometry></self_collision_checking>";
+  const Robot robot = robotFrom(robotOf(link("a", collision("<box size='1 1 1'/>") + spheres)));
+  EXPECT_EQ(joinedText(robot.missing), "");
+  ASSERT_EQ(robot.parts.size(), 1u);
+}
+
+TEST_F(RobotModel, ASphereOfRadiusZeroIsLeftOutByName) {
+  const Robot robot = robotFrom(
+      robotOf(link("a", collision("<sphere radius='0'/>")) +
+              link("b", collision("<box size='1 1 1'/>") + collision("<sphere radius='0'/>")) + joint("a", "b")));
+  EXPECT_EQ(joinedText(robot.missing), "");
+  EXPECT_EQ(joinedText(robot.excluded),
+            "link 'a', a sphere of radius 0\nlink 'b', collision element 2, a sphere of radius 0\n");
+  EXPECT_EQ(robot.parts.size(), 1u);
 }
 
 // Where it is asked for, and only of a link that has nothing else.
@@ -172,7 +206,7 @@ TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {
       {"<mesh filename='/a.stl' scale='1 0 1'/>", "the scale of its mesh /a.stl is 0"},
       {"<box size='1 0 1'/>", "a side of its box is 0 m; it must be above 0"},
       {"<cylinder radius='-1' length='1'/>", "the radius of its cylinder is -1 m"},
-      {"<sphere radius='0'/>", "the radius of its sphere is 0 m"},
+      {"<sphere radius='-1'/>", "the radius of its sphere is -1 m"},
       {"<cone radius='1'/>", "is <cone>, which is no geometry"},
   };
   for (const auto& [geometry, expected] : cases) {
@@ -304,6 +338,12 @@ TEST_F(RobotModel, WhatIsLeftOutIsNotRead) {
   EXPECT_EQ(joinedText(robot.missing), "");
   EXPECT_EQ(robot.left_out, (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(robot.parts.size(), 1u);
+  // Nor are shapes that stand where no URDF has one, which the owner would be told to correct.
+  const std::string odd = "<Collision><geometry><box size='1 1 1'/></geometry></Collision>";
+  config.leave_out = {"a"};
+  const std::string urdf = robotOf(link("a", odd) + link("c", collision("<box size='1 1 1'/>")) + joint("a", "c"));
+  EXPECT_EQ(joinedText(robotFrom(urdf, "", config).missing), "");
+  EXPECT_TRUE(says(robotFrom(urdf).missing, "a <geometry> in <Collision>"));
 }
 
 }  // namespace

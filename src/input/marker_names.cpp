@@ -1,0 +1,52 @@
+#include "input/marker_names.h"
+
+#include <algorithm>
+
+#include "input/short_text.h"
+
+namespace dccd {
+namespace {
+
+/// A name may be as long as a message; its beginning tells markers apart.
+std::string namespaceOf(const MarkerView& marker) { return std::string(marker.ns.substr(0, MAX_NAME)); }
+
+}  // namespace
+
+std::string nameOf(std::string_view ns, std::int32_t id) {
+  return "('" + std::string(ns.substr(0, 32)) + "', " + std::to_string(id) + ")";
+}
+
+std::string nameOf(const MarkerView& marker) { return nameOf(marker.ns, marker.id); }
+
+bool MarkerNames::has(const MarkerView& marker) const {
+  return std::binary_search(namespaces_.begin(), namespaces_.end(), namespaceOf(marker));
+}
+
+bool MarkerNames::isOther(const MarkerView& marker) const {
+  return !namespaces_.empty() && !(has(marker) && (!is_alone_ || marker.id == id_));
+}
+
+void MarkerNames::require(const std::vector<const MarkerView*>& taken) {
+  const bool other_namespace =
+      !namespaces_.empty() && std::none_of(taken.begin(), taken.end(), [&](const auto* one) { return has(*one); });
+  const bool other_id = is_alone_ && taken[0]->is_message && taken[0]->id < id_;
+  if (conflict_.empty() && (other_namespace || other_id)) {
+    conflict_ = "messages with marker " + example_ + " and with " + nameOf(*taken[0]) +
+                " come in turn, so that it is not known which is the mesh; name it by " +
+                (other_namespace ? "marker/namespace" : "marker/id") +
+                ", or publish what belongs together in one MarkerArray (~reset forgets both)";
+  }
+  if (!conflict_.empty()) throw WireError(conflict_);
+}
+
+void MarkerNames::keep(const std::vector<const MarkerView*>& taken) {
+  namespaces_.clear();
+  for (const MarkerView* one : taken) namespaces_.push_back(namespaceOf(*one));
+  std::sort(namespaces_.begin(), namespaces_.end());
+  namespaces_.erase(std::unique(namespaces_.begin(), namespaces_.end()), namespaces_.end());
+  example_ = nameOf(*taken[0]);
+  is_alone_ = taken[0]->is_message;
+  id_ = taken[0]->id;
+}
+
+}  // namespace dccd

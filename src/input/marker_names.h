@@ -1,0 +1,40 @@
+// Whether the markers of a topic's messages are of one thing: a tracker may draw several on one topic.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "input/mesh_views.h"
+
+namespace dccd {
+
+/// For messages.
+std::string nameOf(std::string_view ns, std::int32_t id);
+std::string nameOf(const MarkerView& marker);
+
+/// Of the markers that were taken for the mesh, from message to message. A Marker alone may be numbered anew each time,
+/// upwards: an id that comes back after a higher one is another marker's.
+class MarkerNames {
+ public:
+  /// Throws WireError with both names where these are not those of the message before; from then on always, until
+  /// forget(): nobody knows which of the two is the mesh.
+  void require(const std::vector<const MarkerView*>& taken);
+  /// That message is a frame.
+  void keep(const std::vector<const MarkerView*>& taken);
+  /// Whether a message was a frame, and this marker is none of its things.
+  bool isOther(const MarkerView& marker) const;
+  void forget() { *this = MarkerNames(); }
+
+ private:
+  std::vector<std::string> namespaces_;  // ascending
+  std::string example_;                  // a name of the message before
+  bool is_alone_ = false;                // it was a message of one marker
+  std::int32_t id_ = 0;
+  std::string conflict_;
+
+  bool has(const MarkerView& marker) const;
+};
+
+}  // namespace dccd
