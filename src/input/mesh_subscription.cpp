@@ -103,11 +103,13 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
       } else {
         message.no_memory = bytes->size();
       }
+      message.number = ++came_;
       callback_(std::move(message));
     }
   }
   ended.shutdown();
 } catch (const std::exception& error) {
+  ++came_;
   tellLost(topic_, error);
 }
 
@@ -130,6 +132,7 @@ void MeshSubscription::onTyped(TypedMesh message) try {
   }
   ended.shutdown();
 } catch (const std::exception& error) {
+  ++came_;
   tellLost(topic_, error);
 }
 
@@ -144,6 +147,7 @@ void MeshSubscription::deliver(TypedMesh object) {
   MeshMessage message;
   message.datatype = object.type->datatype;
   message.object = std::move(object);
+  message.number = ++came_;
   callback_(std::move(message));
 }
 

@@ -105,6 +105,7 @@ void CollisionMonitor::Impl::onTransforms(const ShapeShifter& bytes, bool is_sta
   if (const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(bytes))) feed.add(*message, is_static);
   for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
+  feed.lose(is_static);
   tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 

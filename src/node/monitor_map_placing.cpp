@@ -28,7 +28,10 @@ bool MonitorPipeline::findPlace(const LoadedMap& loaded, ObstacleMap& map, std::
   const std::string frame = loaded.frame_id.empty() ? fixed_frame_ : loaded.frame_id;
   map = loaded;
   map.frame_id = frame;
-  if (transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) return true;
+  if (transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
+    map.doubt = doubtAt(frame, fixed_frame_, map.stamp_ns);
+    return true;
+  }
   // A latched map is older than all of tf that a monitor hears that starts later.
   const std::optional<StampNs> first_ns = transforms_.firstStamp(frame, fixed_frame_);
   std::string unused;

@@ -31,6 +31,9 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   refused_.resize(config_.bodies.size());
   checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
+  static_frames_.resize(config_.bodies.size());
+  came_.resize(config_.bodies.size());
+  forgotten_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {
@@ -89,6 +92,8 @@ void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns
 }
 
 void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
+  // First of all: what is refused, or lost to a fault, is missed between the frames before and after it.
+  came_[body] = message.number > 0 ? message.number : came_[body] + 1;
   finishing_ = false;
   Waiting waiting;
   const auto refuse = [&](StepStatus status, const std::string& reason) {
@@ -111,6 +116,8 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     waiting.mesh =
         decoders_[body].decode(message.datatype, {message.bytes.data(), message.bytes.size()}, message.object);
     waiting.mesh.arrival_ns = message.arrival_ns;
+    waiting.mesh.number = came_[body];
+    waiting.mesh.thinned = message.thinned;
     if (topology_filter_) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
@@ -181,9 +188,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (!monitor_->next(now_ns, outcome)) return false;
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
-  nameMissing(outcome);
-  nameUnwatched(outcome);
-  nameNewerMap(outcome);
+  nameShortcomings(outcome.arrival_ns, outcome);
   measureUnknown(outcome);
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
@@ -191,6 +196,12 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   }
   statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken());
   return true;
+}
+
+void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
+  nameMissing(outcome);
+  nameUnwatched(outcome);
+  nameNewerMap(came_ns, outcome);
 }
 
 StatsContext MonitorPipeline::counters() const {
@@ -247,8 +258,7 @@ Outcome MonitorPipeline::checkNow() {
     return outcome;
   }
   outcome = monitor_->checkNow();
-  nameMissing(outcome);
-  nameUnwatched(outcome);
+  nameShortcomings(std::numeric_limits<std::int64_t>::max(), outcome);
   return outcome;
 }
 
