@@ -39,7 +39,6 @@ struct ObstacleMap {
   std::int64_t arrival_ns = 0;                                       ///< of its message, by any clock
   bool trusted = false;                                              ///< nothing of it is ever a body's own
   std::string missed{};  ///< why nobody looked at maps that came before it, or at it; empty: each was looked at
-  std::string doubt{};   ///< why it may not lie where map_from_fixed has it, in words; empty: nothing says so
   OwnVoxels own{};       ///< what was taken out of it
 };
 

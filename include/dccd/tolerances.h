@@ -199,9 +199,6 @@ constexpr std::size_t TRACE_PER_SPOT = 8, TRACE_ALWAYS = 1 << 16;
 constexpr std::size_t MOST_POSES_A_STEP = 1024;
 /// [ns] tf stamps that go back further begin a recording anew: broadcasters of one tree are late by less.
 constexpr long long TF_JUMP_BACK_NS = 1000000000;
-/// [m] and [rad]: what two broadcasters of one transform round apart, also by way of single precision. Larger: a frame
-/// that creeps on /tf_static is taken for one at rest. Smaller: the same frame sent by two programs is no proof.
-constexpr double TF_SAME = 1e-6;
 /// [1] As tf2's own: a rotation whose squared norm is further from 1 is none, and is left out.
 constexpr double TF_QUATERNION_NORM = 1e-2;
 /// [m] A larger mesh draws the advice that it may be in millimetres; no answer depends on it.

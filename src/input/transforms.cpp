@@ -18,6 +18,8 @@ namespace dccd {
 
 namespace {
 
+// [m] and [rad]: what two broadcasters of one transform round apart, also by way of single precision.
+constexpr double SAME = 1e-6;
 // tf2 follows no longer chain.
 constexpr std::size_t MAX_CHAIN = 1000;
 constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
@@ -195,7 +197,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
       continue;
     }
     if (is_static) {
-      if (frame->fixed.parent && !isSame(frame->fixed, sent, tolerance::TF_SAME)) ++times_forgotten_;
+      if (frame->fixed.parent && !isSame(frame->fixed, sent, SAME)) ++times_forgotten_;
       frame->fixed = sent;
     } else {
       if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
@@ -204,7 +206,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
       }
       if (isRepeated(transform, sent, *frame)) {
         const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
-        if (!isSame(frame->sent.at(stamp_ns), sent, tolerance::TF_SAME)) passOver(transform);
+        if (!isSame(frame->sent.at(stamp_ns), sent, SAME)) passOver(transform);
         continue;
       }
     }

@@ -28,10 +28,7 @@ bool MonitorPipeline::findPlace(const LoadedMap& loaded, ObstacleMap& map, std::
   const std::string frame = loaded.frame_id.empty() ? fixed_frame_ : loaded.frame_id;
   map = loaded;
   map.frame_id = frame;
-  if (transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
-    map.doubt = doubtAt(frame, fixed_frame_, map.stamp_ns);
-    return true;
-  }
+  if (transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) return true;
   // A latched map is older than all of tf that a monitor hears that starts later.
   const std::optional<StampNs> first_ns = transforms_.firstStamp(frame, fixed_frame_);
   std::string unused;
@@ -93,6 +90,10 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     if (map.missed.empty()) map.missed = std::exchange(missed, {});
     const std::string frame = map.frame_id;
     const bool is_placed = map.surface != nullptr;
+    if (const std::string doubt = is_placed ? doubtAt(frame, fixed_frame_, map.stamp_ns) : ""; !doubt.empty()) {
+      doubted_map_ns_ = loaded.arrival_ns;
+      map_doubt_ = doubt;
+    }
     monitor_->setMap(std::move(map));
     settled_map_ns_ = loaded.arrival_ns;
     placed_map_.reset();

@@ -202,6 +202,8 @@ void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
   nameMissing(outcome);
   nameUnwatched(outcome);
   nameNewerMap(came_ns, outcome);
+  if (!outcome.answered || !outcome.step->map.surface || outcome.step->map.arrival_ns > doubted_map_ns_) return;
+  outcome.unproved.push_back("where the octomap's frame was at its stamp is not known (" + map_doubt_ + ")");
 }
 
 StatsContext MonitorPipeline::counters() const {

@@ -178,6 +178,8 @@ class MonitorPipeline {
   bool trusted_placed_ = false;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
   std::string map_note_;
+  std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
+  std::string map_doubt_;
   struct ClockFrame {
     StampNs stamp_ns;
     std::uint64_t times_forgotten;  // by tf, when it was placed

@@ -181,13 +181,12 @@ void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_
 
 /// A static body and the map are held where they were. What tf said since must not be contradicted in silence.
 void Monitor::Impl::lookAtHeld(Step& step) const {
-  static const PosesByStamp NONE;
   const auto of_map = map_seen.find(step.map.frame_id);
   for (std::size_t b = 0; b <= bodies.size(); ++b) {
     const bool is_map = b == bodies.size();
-    if (is_map ? !step.map.surface : isStream(b) || stores[b].empty()) continue;
-    const PosesByStamp& seen = !is_map ? held_seen[b] : of_map == map_seen.end() ? NONE : of_map->second;
-    const std::string& doubt = is_map ? step.map.doubt : stores[b].newest().doubt;
+    if (is_map ? !step.map.surface || of_map == map_seen.end() : isStream(b) || stores[b].empty()) continue;
+    const PosesByStamp& seen = is_map ? of_map->second : held_seen[b];
+    const std::string doubt = is_map ? std::string() : stores[b].newest().doubt;
     const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
     double off_m = 0;
     const SeenPose* unknown_at = nullptr;

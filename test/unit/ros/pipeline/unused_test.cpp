@@ -410,13 +410,14 @@ TEST(Unused, AMapThatIsPlacedInDoubtProvesNothingUntilTheNext) {
     const auto giveMap = [&](double at) {
       LoadedMap loaded = decodeMapMessage(mapOf(table(), 1), scene.config);
       loaded.frame_id = "odom";
-      loaded.stamp_ns = static_cast<StampNs>(after(at).toNSec());
+      loaded.stamp_ns = loaded.arrival_ns = static_cast<StampNs>(after(at).toNSec());
       scene.pipeline.setMap(std::move(loaded), 0);
     };
     const auto step = [&](double at) {
       move(at, -0.5);
-      scene.take(0, cloudAt(after(at), 0.05f));
-      EXPECT_TRUE(scene.pipeline.nextOutcome(PATIENCE_NS, scene.outcome));
+      const auto now_ns = static_cast<std::int64_t>(after(at).toNSec());
+      scene.take(0, cloudAt(after(at), 0.05f), now_ns);
+      EXPECT_TRUE(scene.pipeline.nextOutcome(now_ns + PATIENCE_NS, scene.outcome));
       return assuranceOf(scene.outcome).clear();
     };
     move(0, -0.5);
