@@ -149,8 +149,8 @@ void MeshStore::comesAgain(const MeshFrame& frame) {
     ++last.number;
     return;
   }
-  why_ = "its stamp is that of the frame before, which has the body elsewhere";
   last.unknown = "a second frame of the same stamp has the body elsewhere";
+  why_ = "its stamp is that of the frame before, which has the body elsewhere";
 }
 
 /// Of those that came since, so many are accounted for.

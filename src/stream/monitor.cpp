@@ -186,8 +186,9 @@ void Monitor::Impl::jumpBackTo(StampNs stamp_ns) {
 void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason,
                    std::int64_t arrival_ns) {
   Impl& m = *impl_;
+  if (body != m.options.clock_body) m.counters.at(body).count(status);
   m.stores.at(body).passOver(1, toString(status) + (reason.empty() ? "" : ": " + reason));
-  if (body != m.options.clock_body) return m.counters.at(body).count(status);
+  if (body != m.options.clock_body) return;
   Impl::Pending step;
   step.status = status;
   step.stamp_ns = stamp_ns;
