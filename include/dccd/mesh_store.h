@@ -37,6 +37,11 @@ struct MeshFrame {
   std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
   std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
   std::vector<SeenPose> seen = {};    ///< of a rigid body: fixed_from_body since the frame before, ascending
+  /// In the order in which its body's frames came, whatever became of them: between two without a gap none is missing.
+  /// 0: it is the one after the last.
+  std::uint64_t number = 0;
+  std::uint64_t thinned = 0;  ///< frames before it that were left out by choice
+  std::string doubt = {};     ///< why the body may have been elsewhere at the stamp, in words; empty: nothing says so
 };
 
 struct MeshStoreOptions {
@@ -62,6 +67,8 @@ class DCCD_EXPORT MeshStore {
 
   /// OK: continues the frame before. A seam: kept, and begins a new run. DUPLICATE, VERTEX_COUNT: not kept.
   StepStatus push(MeshFrame frame);
+  /// Frames came that will not be pushed. Said of them, where they are missed.
+  void passOver(std::uint64_t count, std::string why);
 
   void clear();
   void setOptions(const MeshStoreOptions& options);
@@ -96,6 +103,13 @@ class DCCD_EXPORT MeshStore {
   /// The path from one stamp to another, both included, newest stretch first.
   std::vector<Stretch> pathWithin(StampNs from_ns, StampNs to_ns) const;
 
+  /// Why it is not known, in words, where the body was between two frames of a run that have some of this time between
+  /// them: one came in between and is not here, or one of them is in doubt. Beyond the newest frame: what came after
+  /// it. Empty: it is known.
+  std::string unknownWithin(StampNs from_ns, StampNs to_ns) const;
+  /// How many were left out by choice between the same frames.
+  std::uint64_t thinnedWithin(StampNs from_ns, StampNs to_ns) const;
+
   /// The poses seen between two stamps, neither included.
   std::vector<SeenPose> seenWithin(StampNs from_ns, StampNs to_ns) const;
 
@@ -106,16 +120,22 @@ class DCCD_EXPORT MeshStore {
   struct Kept {
     std::shared_ptr<const MeshFrame> frame;
     std::uint64_t run = 0;
+    std::uint64_t number = 0;  // up to this one each frame was this, the same once more, or is missed
+    std::string unknown;       // why the way from the frame before, of the same run, is not known; empty: it is
   };
   MeshStoreOptions options_;
   std::deque<Kept> frames_;
   std::uint64_t run_ = 0;
   StepStatus run_reason_ = StepStatus::FIRST_FRAME;
   std::size_t vertices_ = 0;  ///< in all frames kept
+  std::uint64_t came_ = 0;    ///< number of the last frame that came
+  std::string why_;           ///< why it is not here; empty: it is, or nobody said so
 
   StepStatus classify(const MeshFrame& frame) const;
   void forgetOldest();
   std::size_t firstAtOrAfter(StampNs stamp_ns) const;
+  void comesAgain(const MeshFrame& frame);
+  std::string unknownAfterNewest(std::uint64_t accounted) const;
 };
 
 /// Positions between two arrays of equal size, u in [0,1]; the ends are reproduced bit for bit.

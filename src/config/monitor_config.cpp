@@ -91,7 +91,7 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.answer_timeout_s = reader.number("answer_timeout_s", config.answer_timeout_s, 1e-3, LARGE);
   config.queue_size = reader.integer("queue_size", config.queue_size, 1, 100000);
-  config.queue_policy = choiceOf(reader, "queue_policy", QueuePolicy::NEWEST, {"newest", "oldest"});
+  config.queue_policy = choiceOf(reader, "queue_policy", QueuePolicy::NEWEST, {"newest", "oldest", "thin"});
   config.simd_target = reader.get("simd_target", config.simd_target);
   config.record_steps = reader.integer("record_steps", config.record_steps, 0, 10000);
   config.record_folder = reader.get("record_folder", std::string());

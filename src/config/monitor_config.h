@@ -21,7 +21,7 @@
 namespace dccd {
 
 enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED };
-enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
+enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST, THIN };
 struct BodyConfig {
   Body body;
   std::string topic;         ///< streams and static meshes

@@ -20,6 +20,8 @@ struct MeshMessage {
   TypedMesh object = {};
   std::size_t too_large = 0;  ///< bytes that it had; it was emptied, since no queue has room for it
   std::size_t no_memory = 0;  ///< bytes that it had; there was not the memory to take them over
+  std::uint64_t number = 0;   ///< in the order in which the topic's came, with those that were lost; 0: after the last
+  std::uint64_t thinned = 0;  ///< before it, that a queue left out by choice
 
   std::size_t size() const { return object.type ? object.type->size(object.message.get()) : bytes.size(); }
 };

@@ -105,11 +105,13 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
       } else {
         message.no_memory = bytes->size();
       }
+      message.number = ++came_;
       callback_(std::move(message));
     }
   }
   ended.shutdown();
 } catch (const std::exception& error) {
+  ++came_;
   tellLost(topic_, error);
 }
 
@@ -132,6 +134,7 @@ void MeshSubscription::onTyped(TypedMesh message) try {
   }
   ended.shutdown();
 } catch (const std::exception& error) {
+  ++came_;
   tellLost(topic_, error);
 }
 
@@ -146,6 +149,7 @@ void MeshSubscription::deliver(TypedMesh object) {
   MeshMessage message;
   message.datatype = object.type->datatype;
   message.object = std::move(object);
+  message.number = ++came_;
   callback_(std::move(message));
 }
 

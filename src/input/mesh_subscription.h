@@ -32,7 +32,7 @@ namespace dccd {
 /// - when none has come yet and there are publishers that are not connected: with one type after the other.
 class MeshSubscription {
  public:
-  /// Gets each message, its times of receipt and arrival unset.
+  /// Gets each message with its number, its times of receipt and arrival unset.
   using Callback = std::function<void(MeshMessage)>;
 
   /// Subscribes to `topic` at once.
@@ -54,6 +54,7 @@ class MeshSubscription {
   Callback callback_;
   std::atomic<std::uint32_t> publishers_{0};
   std::atomic<std::int64_t> last_message_ns_;
+  std::atomic<std::uint64_t> came_{0};  // messages that were handed on, or lost
   std::mutex mutex_;  // of all up to the next blank line; held over no call that waits for the master or a callback
   ros::Subscriber any_, typed_;
   bool has_type_ = false;   // a publisher was there since the topic was opened

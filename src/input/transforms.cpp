@@ -19,6 +19,8 @@ namespace dccd {
 
 namespace {
 
+// [m] and [rad]: what two broadcasters of one transform round apart, also by way of single precision.
+constexpr double SAME = 1e-6;
 // tf2 follows no longer chain.
 constexpr std::size_t MAX_CHAIN = 1000;
 constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
@@ -121,7 +123,12 @@ bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform,
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
   const auto newest = frame.newest.try_emplace(*sent.sender, stamp_ns).first;
   newest->second = std::max(newest->second, stamp_ns);
-  if (!frame.sent.emplace(stamp_ns, sent).second) return true;
+  const auto [at, is_new] = frame.sent.emplace(stamp_ns, sent);
+  if (!is_new) return true;
+  const auto next = std::next(at);
+  const bool passed_over = next == frame.sent.end() ? std::exchange(frame.passed_over, false) : next->second.gap;
+  const bool lost = std::exchange(frame.lost, lost_) != lost_;
+  at->second.gap = passed_over || lost;
   const auto old =
       frame.sent.lower_bound(frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
   const std::size_t before = frame.sent.size();
@@ -137,7 +144,7 @@ void TransformFeed::clear() {
   for (auto& named : frames_) {
     named.second.sent.clear();
     named.second.newest.clear();
-    named.second.is_cut = named.second.is_apart = false;
+    named.second.is_cut = named.second.is_apart = named.second.passed_over = false;
   }
   kept_count_ = 0;
   has_apart_ = false;
@@ -179,8 +186,14 @@ tf2_msgs::TFMessage::ConstPtr TransformFeed::read(const std::string& topic, std:
     const std::lock_guard<std::mutex> lock(mutex_);
     ++unusable_;
     if (told_.insert(topic).second) complaints_.push_back("a message on " + topic + " is damaged and left out");
-    return nullptr;
   }
+  lose(topic == "/tf_static");
+  return nullptr;
+}
+
+void TransformFeed::lose(bool is_static) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  is_static ? ++times_forgotten_ : ++lost_;
 }
 
 std::string TransformFeed::noTransform(const std::string& from, const std::string& to, const std::string& why) const {
@@ -207,12 +220,16 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
   for (const auto& transform : message.transforms) {
     if (const std::string problem = problemOf(transform); !problem.empty()) {
       leaveOut(transform, problem);
+      passOver(transform);
       continue;
     }
     if (!only_unusable_.empty()) only_unusable_.erase(unslashed(transform.child_frame_id));
     const Frame* parent = roomFor(unslashed(transform.header.frame_id));
     Frame* frame = roomFor(unslashed(transform.child_frame_id));
-    if (!parent || !frame) continue;
+    if (!parent || !frame) {
+      passOver(transform);
+      continue;
+    }
     ++change_;
     const Sent sent{parent, poseOf(transform.transform), senderOf(sender)};
     if (!frame->is_static) frame->is_static = is_static;
@@ -221,7 +238,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       continue;
     }
     if (is_static) {
-      if (frame->fixed.parent && !isThere(*frame, sent)) ++times_forgotten_;
+      if (frame->fixed.parent && !isSame(frame->fixed, sent, SAME)) ++times_forgotten_;
       frame->fixed = sent;
     } else {
       const Jump jump = jumpOf(transform, *sent.sender);
@@ -230,7 +247,12 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       if (is_full) clear();
       if (jump == Jump::TWO_SENDERS) forget(*frame);
       if (jump == Jump::LOOP) forgetAllOf(*sent.sender);
-      if (isRepeated(transform, sent, *frame) || frame->is_apart) continue;
+      if (isRepeated(transform, sent, *frame)) {
+        const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+        if (!isSame(frame->sent.at(stamp_ns), sent, SAME)) passOver(transform);
+        continue;
+      }
+      if (frame->is_apart) continue;
     }
     buffer_.setTransform(transform, "tf", is_static);
   }
@@ -240,10 +262,26 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
 /// Where the frame was last, as far as that is told from the path of a step.
 bool TransformFeed::isThere(const Frame& frame, const Sent& sent) {
   if (!*frame.is_static && frame.sent.empty()) return false;
-  const Sent& last = *frame.is_static ? frame.fixed : frame.sent.rbegin()->second;
-  return last.parent == sent.parent &&
-         (last.pose.translation - sent.pose.translation).norm() <= tolerance::RIGID_PATH_M &&
-         last.pose.rotation.angularDistance(sent.pose.rotation) <= tolerance::RIGID_PATH_M;
+  return isSame(*frame.is_static ? frame.fixed : frame.sent.rbegin()->second, sent, tolerance::RIGID_PATH_M);
+}
+
+/// tolerance: of translation [m] and rotation [rad].
+bool TransformFeed::isSame(const Sent& a, const Sent& b, double tolerance) {
+  return a.parent == b.parent && (a.pose.translation - b.pose.translation).norm() <= tolerance &&
+         a.pose.rotation.angularDistance(b.pose.rotation) <= tolerance;
+}
+
+/// It came and is not used: where the frame was around its stamp nobody knows.
+void TransformFeed::passOver(const geometry_msgs::TransformStamped& transform) {
+  const auto known = frames_.find(unslashed(transform.child_frame_id));
+  if (known == frames_.end()) return;
+  Frame& frame = known->second;
+  if (frame.is_static.value_or(false)) ++times_forgotten_;
+  ++change_;
+  const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+  const auto at = frame.sent.find(stamp_ns), next = frame.sent.upper_bound(stamp_ns);
+  if (at != frame.sent.end()) at->second.gap = true;
+  (next == frame.sent.end() ? frame.passed_over : next->second.gap) = true;
 }
 
 /// On the way that was found last, or as far as it goes; null: none.
@@ -443,16 +481,20 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
       const Frame *const parent = parentAt(frame, end_ns), *before = nullptr;
       StampNs since_ns = from_ns;
       auto one = after(frame, end_ns);
+      bool has_gap =
+          one != frame.sent.end() && one != frame.sent.begin() && one->second.gap && std::prev(one)->first < end_ns;
       while (one != frame.sent.begin()) {
         --one;
+        has_gap = has_gap || (one->second.gap && one->first > from_ns && one != frame.sent.begin());
         before = one->second.parent;
         if (before != parent) break;
         since_ns = one->first;
         if (since_ns <= from_ns) break;
         if (since_ns < to_ns) stamps.push_back(since_ns);
       }
+      if (has_gap) changes.push_back({end_ns, &frame.name, nullptr, nullptr});
       const bool has_all = since_ns <= from_ns || (before == parent && !frame.is_cut);
-      if (has_all && stamps.size() == found_before) frame.none_between = question;
+      if (has_all && !has_gap && stamps.size() == found_before) frame.none_between = question;
       if (has_all || since_ns <= last.stamp_ns) return;
       last = {since_ns, &frame.name, before == parent ? nullptr : &before->name, &parent->name};
     });

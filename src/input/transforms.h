@@ -46,6 +46,8 @@ class TransformFeed {
   explicit TransformFeed(tf2::BufferCore& buffer);
   /// What these bytes of the topic are. Null where they do not hold what they say, which is counted as unusable.
   tf2_msgs::TFMessage::ConstPtr read(const std::string& topic, std::vector<std::uint8_t> bytes);
+  /// A message of the topic could not be taken.
+  void lose(bool is_static);
   /// Whether add() would forget what this publisher sent. `sender`: the caller's id of its connection.
   bool clears(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender = {}) const;
   /// Returns true when transforms were forgotten.
@@ -57,7 +59,8 @@ class TransformFeed {
   bool lookup(const std::string& target, const std::string& source, StampNs stamp_ns, Eigen::Isometry3d& transform,
               std::string& reason) const;
   /// From the stamp on a frame had this parent. Before that it had another one, or, where that is null, what was sent
-  /// is not kept any more. The names stay.
+  /// is not kept any more. Where both are null, something came for a time before the stamp, and after the transform
+  /// before it, that is not used. The names stay.
   struct NewParent {
     StampNs stamp_ns;
     const std::string *frame, *before, *now;
@@ -92,6 +95,7 @@ class TransformFeed {
     const Frame* parent = nullptr;
     Pose pose;                            ///< parent_from_frame
     const std::string* sender = nullptr;  ///< its place in senders_
+    bool gap = false;  ///< something came for a time between the one before and this, and is not used
   };
   /// One that tf has named. What the buffer holds of it is here as well, by numbers.
   struct Frame {
@@ -102,6 +106,8 @@ class TransformFeed {
     std::map<std::string, StampNs> newest;  ///< of each publisher; 0: it went back
     bool is_cut = false;                    ///< older ones were sent
     bool is_apart = false;                  ///< some were forgotten that the buffer holds; it gets no more
+    bool passed_over = false;               ///< something came for a time after the newest, and is not used
+    std::uint64_t lost = 0;                 ///< lost_ when the newest came
     bool is_disputed = false;               ///< it is on both topics, and not at one place
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;
@@ -118,6 +124,7 @@ class TransformFeed {
   std::uint64_t change_ = 1;                       // counts what was added
   mutable Chain from_target_, from_source_;        // buffers of a question
   std::size_t kept_count_ = 0, max_kept_;
+  std::uint64_t lost_ = 0;  // messages of /tf of which nobody knows what was in them
   std::set<std::string> senders_;
   bool has_disputed_ = false, has_apart_ = false;
   std::atomic<std::uint64_t> unusable_{0}, times_forgotten_{0};
@@ -132,7 +139,9 @@ class TransformFeed {
   Jump jumpOf(const geometry_msgs::TransformStamped& transform, const std::string& sender) const;
   void forget(Frame& frame);
   void forgetAllOf(const std::string& sender);
+  static bool isSame(const Sent& a, const Sent& b, double tolerance);
   static bool isThere(const Frame& frame, const Sent& sent);
+  void passOver(const geometry_msgs::TransformStamped& transform);
   void dispute(const geometry_msgs::TransformStamped& transform, Frame& frame);
   const Frame* disputedOnWay() const;
   const Frame* firstApart() const;

@@ -106,6 +106,7 @@ void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShi
   if (message) feed.add(*message, is_static, event.getPublisherName());
   for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
+  feed.lose(is_static);
   tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 

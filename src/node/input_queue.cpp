@@ -27,6 +27,9 @@ void InputQueue::push(std::size_t body, MeshMessage message) {
       ++dropped_[body];
       // What lies in other bodies' queues is theirs.
       if (policies_[body] == QueuePolicy::OLDEST || queue.empty()) return;
+      if (policies_[body] == QueuePolicy::THIN) {
+        (queue.size() > 1 ? queue[1] : message).thinned += queue.front().thinned + 1;
+      }
       bytes_ -= queue.front().size();
       queue.pop_front();
     }

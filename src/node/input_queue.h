@@ -28,8 +28,9 @@ class InputQueue {
 
   /// Before the first message: this body's newest message is never the one that is dropped.
   void keepNewest(std::size_t body) { policies_[body] = QueuePolicy::NEWEST; }
-  /// A full queue drops its oldest messages (newest) or this one (oldest), and counts them; so does one for which there
-  /// is no room in bytes beside the others. One that has no room at all is kept without its content.
+  /// A full queue drops its oldest messages (newest, thin) or this one (oldest), and counts them; so does one for which
+  /// there is no room in bytes beside the others. One that has no room at all is kept without its content. `thin`: the
+  /// next message says how many were left out before it.
   void push(std::size_t body, MeshMessage message);
   /// False when the body has none.
   bool pop(std::size_t body, MeshMessage& message);

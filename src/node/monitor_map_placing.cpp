@@ -90,6 +90,10 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     if (map.missed.empty()) map.missed = std::exchange(missed, {});
     const std::string frame = map.frame_id;
     const bool is_placed = map.surface != nullptr;
+    if (const std::string doubt = is_placed ? doubtAt(frame, fixed_frame_, map.stamp_ns) : ""; !doubt.empty()) {
+      doubted_map_ns_ = loaded.arrival_ns;
+      map_doubt_ = doubt;
+    }
     monitor_->setMap(std::move(map));
     settled_map_ns_ = loaded.arrival_ns;
     placed_map_.reset();

@@ -30,6 +30,9 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
   passed_over_.resize(config_.bodies.size());
+  static_frames_.resize(config_.bodies.size());
+  came_.resize(config_.bodies.size());
+  forgotten_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {
@@ -57,6 +60,8 @@ void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns
 }
 
 void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
+  // First of all: what is refused, or lost to a fault, is missed between the frames before and after it.
+  came_[body] = message.number > 0 ? message.number : came_[body] + 1;
   finishing_ = false;
   Waiting waiting;
   const auto refuse = [&](StepStatus status, const std::string& reason) {
@@ -79,6 +84,8 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     waiting.mesh =
         decoders_[body].decode(message.datatype, {message.bytes.data(), message.bytes.size()}, message.object);
     waiting.mesh.arrival_ns = message.arrival_ns;
+    waiting.mesh.number = came_[body] - passed_over_[body].messages;  // which are no frames
+    waiting.mesh.thinned = message.thinned;
     if (topology_filter_) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
@@ -155,15 +162,21 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (resting_) return true;
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
-  nameMissing(outcome);
-  nameUnwatched(outcome);
-  nameNewerMap(outcome);
+  nameShortcomings(outcome.arrival_ns, outcome);
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
     promises_.follow(outcome);
   }
   statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken());
   return true;
+}
+
+void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
+  nameMissing(outcome);
+  nameUnwatched(outcome);
+  nameNewerMap(came_ns, outcome);
+  if (!outcome.answered || !outcome.step->map.surface || outcome.step->map.arrival_ns > doubted_map_ns_) return;
+  outcome.unproved.push_back("where the octomap's frame was at its stamp is not known (" + map_doubt_ + ")");
 }
 
 StatsContext MonitorPipeline::counters() const {
@@ -221,8 +234,7 @@ Outcome MonitorPipeline::checkNow() {
     return outcome;
   }
   outcome = monitor_->checkNow();
-  nameMissing(outcome);
-  nameUnwatched(outcome);
+  nameShortcomings(std::numeric_limits<std::int64_t>::max(), outcome);
   return outcome;
 }
 

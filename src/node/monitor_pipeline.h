@@ -162,8 +162,11 @@ class MonitorPipeline {
   std::vector<std::optional<Waiting>> waiting_;
   PromiseWatch promises_;
   Statement statement_;
-  std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
-  std::vector<bool> placed_;         // a static body of which the monitor has a frame
+  std::vector<StampNs> widened_ns_;                      // per body, its last frame that widen() has seen; 0: none
+  std::vector<bool> placed_;                             // a static body of which the monitor has a frame
+  std::vector<std::string> static_frames_;               // of such a body, which it is held to; empty: to none
+  std::vector<std::uint64_t> came_;                      // per body, the number of its last message
+  std::vector<std::optional<std::uint64_t>> forgotten_;  // by tf, when the body's last frame was placed
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
   std::vector<std::optional<Rigid>> rigid_;
   std::vector<std::optional<Attached>> attached_;
@@ -183,6 +186,8 @@ class MonitorPipeline {
   bool trusted_placed_ = false;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
   std::string map_note_;
+  std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
+  std::string map_doubt_;
   struct ClockFrame {
     StampNs stamp_ns;
     std::uint64_t times_forgotten;  // by tf, when it was placed
@@ -228,6 +233,9 @@ class MonitorPipeline {
   bool isHopeless(std::size_t body) const { return !refused_[body].empty() || waiting_[body]->kept; }
   /// Why the body, whose frame waits or was refused, has no place.
   std::string missing(std::size_t body) const;
+  /// All that a step cannot show by itself, also of one that nobody but a service asked for. `came_ns`: arrival of its
+  /// frame; what came up to then had to be used.
+  void nameShortcomings(std::int64_t came_ns, Outcome& outcome);
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
   /// Puts the room beside straight paths into the frame's radii, by max_acceleration_m_s2.
@@ -255,8 +263,8 @@ class MonitorPipeline {
   bool settleMap(const LoadedMap& loaded, bool may_place, ObstacleMap& map, std::string& reason);
   void placeMaps(std::int64_t now_ns);
   void limitUnplacedMaps();
-  /// Says of a step with a map that one which came before its frame has no place yet.
-  void nameNewerMap(Outcome& outcome) const;
+  /// Says of a step with a map that one which came up to then has no place yet.
+  void nameNewerMap(std::int64_t came_ns, Outcome& outcome) const;
   /// Poses that were seen, of static bodies by number, and of maps by their frames.
   struct SeenPoses {
     std::map<std::size_t, std::vector<SeenPose>> bodies;
@@ -266,6 +274,10 @@ class MonitorPipeline {
   /// stamp of the one that waits. False: it is not known of all.
   bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
   std::vector<SeenPose> lookBack(const std::string& target, const std::string& source) const;
+  std::vector<SeenPose> findStatic(const std::string& frame, StampNs stamp_ns) const;
+  /// Why tf may be wrong about the place of the body's frame; empty: nothing says so.
+  std::string doubtOf(std::size_t body, const DecodedMesh& mesh, std::uint64_t times_forgotten);
+  std::string doubtAt(const std::string& target, const std::string& source, StampNs stamp_ns) const;
   /// Between a frame of the clock body and a stamp.
   std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, const ClockFrame& from,
                                      StampNs to_ns) const;

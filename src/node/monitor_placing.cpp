@@ -29,12 +29,19 @@ std::string secondsOf(StampNs stamp_ns) {
   return text.str();
 }
 
+const char* const FORGOTTEN = "stamps of tf went back, or a static transform is another one";
+
 std::string noTransformAt(StampNs stamp_ns) { return "no transform of its frame at " + secondsOf(stamp_ns); }
 
 /// How tf has it before the change is as good as unknown: what carried the frame until then may have gone anywhere
 /// after it was last sent.
 SeenPose unknownBefore(const TransformFeed::NewParent& change) {
   const std::string name = "'" + shortText(*change.frame, MAX_NAME) + "'";
+  if (!change.now) {
+    return unknownAt(change.stamp_ns - 1, "a transform of frame " + name +
+                                              " came that cannot be used, or that has it elsewhere at a stamp that it "
+                                              "had already");
+  }
   if (!change.before) {
     return unknownAt(change.stamp_ns - 1,
                      "tf keeps nothing of frame " + name + " before " + secondsOf(change.stamp_ns));
@@ -150,10 +157,10 @@ void MonitorPipeline::nameMissing(Outcome& outcome) const {
   }
 }
 
-void MonitorPipeline::nameNewerMap(Outcome& outcome) const {
+void MonitorPipeline::nameNewerMap(std::int64_t came_ns, Outcome& outcome) const {
   if (!outcome.answered || !outcome.step->map.surface) return;
   for (const UnplacedMap& one : unplaced_maps_) {
-    if (one.map.arrival_ns > outcome.arrival_ns) continue;
+    if (one.map.arrival_ns > came_ns) continue;
     outcome.unproved.push_back("an octomap that came before this frame has no place: no transform of its frame '" +
                                one.map.frame_id + "' at " + secondsOf(one.map.stamp_ns) +
                                "; raise transform_timeout_s to what tf lags behind");
@@ -222,10 +229,16 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     skip(body, problem, done.mesh.stamp_ns, done.mesh.arrival_ns, reason);
     return true;
   }
-  if (isStatic(body)) done.mesh.pose = fixed_from_mesh;
-  if (isStatic(body) && config_.fixed_frame.empty()) {
-    static_meshes_[body] = done.mesh;
-    monitor_->seen(body, lookBack(fixed_frame_, done.mesh.frame_id));
+  done.mesh.doubt = doubtOf(body, done.mesh, times_forgotten);
+  if (isStatic(body)) {
+    done.mesh.pose = fixed_from_mesh;
+    // A camera may move, and what it saw is where it was then.
+    const bool is_sensors = config_.bodies[body].input.source == TopologySource::DEPTH_IMAGE;
+    static_frames_[body] = is_sensors && !config_.fixed_frame.empty() ? "" : done.mesh.frame_id;
+    if (config_.fixed_frame.empty()) {
+      static_meshes_[body] = done.mesh;
+      monitor_->seen(body, lookBack(fixed_frame_, done.mesh.frame_id));
+    }
   }
   transform(fixed_from_mesh, done.mesh.positions);
   if (is_clock) {
@@ -254,12 +267,45 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   for (const std::string& frame : monitor_->mapFrames()) {
     if (frame != fixed_frame_) held.maps[frame] = find(frame, fixed_frame_);
   }
-  // A fixed frame that was named is at rest: somebody says so. One that was learnt may be a camera's that moves.
-  for (std::size_t b = 0; b < static_meshes_.size(); ++b) {
-    const std::optional<DecodedMesh>& mesh = static_meshes_[b];
-    if (mesh && mesh->frame_id != fixed_frame_) held.bodies[b] = find(fixed_frame_, mesh->frame_id);
+  // A fixed frame that was learnt may be a camera's that moves. In one that was named a static body may be of a frame
+  // that was sent once: what is not sent is not elsewhere.
+  for (std::size_t b = 0; b < placed_.size(); ++b) {
+    const std::string& frame = static_frames_[b];
+    if (!placed_[b] || frame.empty() || frame == fixed_frame_) continue;
+    held.bodies[b] = config_.fixed_frame.empty() ? find(fixed_frame_, frame) : findStatic(frame, stamp_ns);
   }
   return all_known;
+}
+
+/// As far as tf says where it is.
+std::vector<SeenPose> MonitorPipeline::findStatic(const std::string& frame, StampNs stamp_ns) const {
+  std::vector<SeenPose> seen;
+  if (!clock_frames_.empty()) seen = posesBetween(fixed_frame_, frame, clock_frames_.back(), stamp_ns);
+  std::string unused;
+  SeenPose last{stamp_ns, {}};
+  const bool known = transforms_.lookup(fixed_frame_, frame, stamp_ns, last.pose, unused) ||
+                     transforms_.lookup(fixed_frame_, frame, 0, last.pose, unused);  // the newest
+  if (known) seen.push_back(last);
+  return seen;
+}
+
+std::string MonitorPipeline::doubtOf(std::size_t body, const DecodedMesh& mesh, std::uint64_t times_forgotten) {
+  const std::uint64_t before = std::exchange(forgotten_[body], times_forgotten).value_or(times_forgotten);
+  if (mesh.frame_id == fixed_frame_) return {};
+  // Where the frame before was, tf may say otherwise by now.
+  if (!isStatic(body) && before != times_forgotten) return FORGOTTEN;
+  return doubtAt(fixed_frame_, mesh.frame_id, mesh.stamp_ns);
+}
+
+/// Next to the stamp something of the way is missing.
+std::string MonitorPipeline::doubtAt(const std::string& target, const std::string& source, StampNs stamp_ns) const {
+  if (target == source) return {};
+  std::vector<TransformFeed::NewParent> changes;
+  transforms_.stampsBetween(target, source, stamp_ns - 1, stamp_ns + 1, changes);
+  for (const TransformFeed::NewParent& change : changes) {
+    if (!change.now) return unknownBefore(change).why_unknown;
+  }
+  return {};
 }
 
 /// Steps that wait for other bodies will be answered with what is held only now, and the next one begins where the
@@ -316,7 +362,7 @@ std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, c
   if (!mayBeAStep(from.stamp_ns, to_ns)) return seen;
   // What tf saw before that, nobody knows any more.
   if (transforms_.timesForgotten() != from.times_forgotten) {
-    return {unknownAt(to_ns - 1, "stamps of tf went back, or a static transform is another one")};
+    return {unknownAt(to_ns - 1, FORGOTTEN)};
   }
   std::vector<TransformFeed::NewParent> changes;
   const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from.stamp_ns, to_ns, changes);

@@ -17,18 +17,24 @@ namespace dccd {
 namespace {
 
 constexpr std::chrono::milliseconds PERIOD{20};
+// A /clock that stands is a pause; for longer, whoever sent it may be gone.
+constexpr std::int64_t LONGEST_STAND_NS = 10'000'000'000;
 
 }  // namespace
 
 std::int64_t WatchClock::now() {
-  const bool simulated = ros::Time::isSimTime();
-  const std::int64_t now_ns = simulated ? static_cast<std::int64_t>(ros::Time::now().toNSec()) : steadyNs();
-  // Before the first /clock the time is 0, and from there to the first one nothing passes.
+  const std::int64_t steady_ns = steadyNs(), ros_ns = static_cast<std::int64_t>(ros::Time::now().toNSec());
+  // Before the first /clock the time is 0. There may never be one, and true time passes until then.
+  const bool simulated = ros::Time::isSimTime() && ros_ns > 0;
+  const std::int64_t now_ns = simulated ? ros_ns : steady_ns;
   const bool begins = simulated != std::exchange(simulated_, simulated) || last_ns_ == 0;
   if (begins || now_ns != last_ns_) {
-    const std::int64_t steady_ns = steadyNs(), true_ns = steady_ns - std::exchange(changed_ns_, steady_ns);
+    const std::int64_t true_ns = steady_ns - std::exchange(changed_ns_, steady_ns);
     if (!begins) elapsed_ns_ += now_ns > last_ns_ ? now_ns - last_ns_ : std::min(last_ns_ - now_ns, true_ns);
     last_ns_ = now_ns;
+  } else if (const std::int64_t beyond_ns = steady_ns - changed_ns_ - LONGEST_STAND_NS; beyond_ns > 0) {
+    elapsed_ns_ += beyond_ns;
+    changed_ns_ += beyond_ns;
   }
   return elapsed_ns_;
 }

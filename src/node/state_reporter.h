@@ -21,9 +21,9 @@
 
 namespace dccd {
 
-/// Runs with the steady clock; with /use_sim_time with /clock, at its rate, and stands while that stands. While /clock
-/// goes back true time passes, as much as it goes back at the most: a clock that runs backwards hides no silence, and
-/// one that jumps back, as of a bag in a loop, takes nothing away.
+/// Runs with the steady clock; with /use_sim_time, from the first /clock on, with that, at its rate, and stands while
+/// that stands, for ten seconds. While /clock goes back true time passes, as much as it goes back at the most: a clock
+/// that runs backwards hides no silence, and one that jumps back, as of a bag in a loop, takes nothing away.
 class WatchClock {
  public:
   std::int64_t now();

@@ -131,7 +131,10 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
       if (reason.compare(0, 10, "parameter ") == 0) return "the vertices are numbered from 0";
       return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
     case StepStatus::PARTIAL:
-      if (reason.find("(no transform") == std::string::npos) return {};
+      if (reason.find("not used: QUEUE_FULL") != std::string::npos) return adviceFor(StepStatus::QUEUE_FULL, "", "");
+      if (reason.find("(no transform") == std::string::npos && reason.find("NO_TRANSFORM: ") == std::string::npos) {
+        return {};
+      }
       return "see whether its tf comes (rosrun tf tf_echo; for a robot robot_state_publisher and its joint states); "
              "one that comes late needs a larger transform_timeout_s";
     case StepStatus::DEADLINE:
@@ -140,7 +143,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
       return "raise max_contacts to see all; where the work was cut, see what lies in one place, or raise "
              "max_memory_mb";
     case StepStatus::QUEUE_FULL:
-      return "raise num_threads, or send fewer vertices";
+      return "raise num_threads, send fewer vertices, or leave frames out by choice with queue_policy: thin";
     default:
       return {};
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <stdexcept>
 #include <string>
@@ -31,6 +32,17 @@ bool teleports(const Positions& a, const Positions& b, double limit_m) {
     if ((b[i] - a[i]).squaredNorm() > limit_sq && a[i].allFinite() && b[i].allFinite()) return true;
   }
   return false;
+}
+
+/// Bit for bit: a lost vertex is one once more.
+template <class T>
+bool sameBits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+bool isTheSame(const MeshFrame& a, const MeshFrame& b) {
+  return (a.topology == b.topology || *a.topology == *b.topology) && sameBits(a.positions, b.positions) &&
+         sameBits(a.radius_m, b.radius_m) && a.dropped_faces == b.dropped_faces && a.doubt == b.doubt;
 }
 
 double fraction(StampNs a, StampNs b, StampNs at) { return static_cast<double>(at - a) / static_cast<double>(b - a); }
@@ -92,13 +104,23 @@ StepStatus MeshStore::classify(const MeshFrame& frame) const {
 }
 
 StepStatus MeshStore::push(MeshFrame frame) {
+  came_ = frame.number > 0 ? frame.number : came_ + 1;  // whatever becomes of it
   const StepStatus status = classify(frame);
+  if (status == StepStatus::DUPLICATE) comesAgain(frame);
+  if (status == StepStatus::VERTEX_COUNT) why_ = toString(status);
   if (status == StepStatus::VERTEX_COUNT || status == StepStatus::DUPLICATE) return status;
   const bool begins = status != StepStatus::OK;
   if (!begins) frame.topology = newest().topology;  // equal; one object a run, so that pointers tell runs apart
   const std::size_t vertices = frame.positions.size();
   // What may throw comes first.
-  frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_ + (begins ? 1 : 0)});
+  std::string unknown;
+  if (!begins) {
+    unknown = unknownAfterNewest(frame.thinned + 1);
+    if (unknown.empty()) unknown = frame.doubt;
+  }
+  frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_ + (begins ? 1 : 0), came_, {}});
+  frames_.back().unknown = std::move(unknown);
+  why_.clear();
   vertices_ += vertices;
   if (begins) {
     ++run_;
@@ -113,6 +135,48 @@ StepStatus MeshStore::push(MeshFrame frame) {
   };
   while (full()) forgetOldest();
   return status;
+}
+
+void MeshStore::passOver(std::uint64_t count, std::string why) {
+  came_ += count;
+  why_ = std::move(why);
+}
+
+/// With the stamp of the newest one: if it is that one once more nothing is missed with it.
+void MeshStore::comesAgain(const MeshFrame& frame) {
+  Kept& last = frames_.back();
+  if (isTheSame(*last.frame, frame)) {
+    ++last.number;
+    return;
+  }
+  last.unknown = "a second frame of the same stamp has the body elsewhere";
+  why_ = "its stamp is that of the frame before, which has the body elsewhere";
+}
+
+/// Of those that came since, so many are accounted for.
+std::string MeshStore::unknownAfterNewest(std::uint64_t accounted) const {
+  const Kept& last = frames_.back();
+  if (came_ <= last.number + accounted) return last.frame->doubt;
+  const std::uint64_t missed = came_ - last.number - accounted;
+  return std::to_string(missed) + (missed == 1 ? " frame of it that came was" : " frames of it that came were") +
+         " not used: " + (why_.empty() ? "lost on the way here" : why_);
+}
+
+std::string MeshStore::unknownWithin(StampNs from_ns, StampNs to_ns) const {
+  std::size_t i = firstAtOrAfter(from_ns + 1);
+  for (; i < frames_.size() && (i == 0 || frames_[i - 1].frame->stamp_ns < to_ns); ++i) {
+    if (!frames_[i].unknown.empty()) return frames_[i].unknown;
+  }
+  return i == frames_.size() && !empty() && newest().stamp_ns < to_ns ? unknownAfterNewest(0) : std::string();
+}
+
+std::uint64_t MeshStore::thinnedWithin(StampNs from_ns, StampNs to_ns) const {
+  std::uint64_t sum = 0;
+  for (std::size_t i = firstAtOrAfter(from_ns + 1);
+       i < frames_.size() && (i == 0 || frames_[i - 1].frame->stamp_ns < to_ns); ++i) {
+    sum += frames_[i].frame->thinned;
+  }
+  return sum;
 }
 
 std::shared_ptr<const MeshFrame> MeshStore::previous() const {

@@ -101,6 +101,7 @@ void Monitor::countReceived(std::size_t body, std::uint64_t count, std::uint64_t
 
 void Monitor::countDropped(std::size_t body, StepStatus status, std::uint64_t count) {
   impl_->counters.at(body).by_status.at(static_cast<std::size_t>(status)) += count;
+  if (count > 0) impl_->stores[body].passOver(count, toString(status));
 }
 
 void Monitor::setListener(StepListener* listener) { impl_->listener = listener; }
@@ -185,7 +186,9 @@ void Monitor::Impl::jumpBackTo(StampNs stamp_ns) {
 void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason,
                    std::int64_t arrival_ns) {
   Impl& m = *impl_;
-  if (body != m.options.clock_body) return m.counters.at(body).count(status);
+  if (body != m.options.clock_body) m.counters.at(body).count(status);
+  m.stores.at(body).passOver(1, toString(status) + (reason.empty() ? "" : ": " + reason));
+  if (body != m.options.clock_body) return;
   Impl::Pending step;
   step.status = status;
   step.stamp_ns = stamp_ns;
@@ -273,6 +276,7 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;
+  outcome.excluded.insert(outcome.excluded.end(), thinned_out.begin(), thinned_out.end());
   outcome.stats[Effect::OWN_VOXELS].ms += own_voxels_ms;
   outcome.stats.total_ms += own_voxels_ms;
   if (!options.detector.patches) {

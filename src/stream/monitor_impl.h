@@ -47,7 +47,8 @@ struct Monitor::Impl {
   std::deque<ObstacleMap> maps_to_come;  // as they were given: newer than what is known of the bodies
   std::string missed_maps;               // why nobody looked at some since the last one that is to come, or empty
   OwnVoxelFinder own_voxels;
-  double own_voxels_ms = 0;  // of the step that is made
+  double own_voxels_ms = 0;              // of the step that is made
+  std::vector<std::string> thinned_out;  // of that step, in words
   /// For the steps to come: per body, and by the frames of maps.
   using PosesByStamp = std::map<StampNs, SeenPose>;
   std::vector<PosesByStamp> held_seen;
@@ -97,6 +98,8 @@ struct Monitor::Impl {
   void dropAtSeam(std::size_t body, Pending& step);
   Step place(const Pending& pending);
   void lookBetween(std::size_t body, Step& step) const;
+  /// Says of the step what came of the body between the stamps and was not used.
+  void lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const;
   void lookAtHeld(Step& step) const;
   /// The earliest stamp at which a step to come may begin; where none is known of, the given one.
   StampNs oldestStart(StampNs otherwise) const;

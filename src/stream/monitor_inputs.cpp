@@ -59,9 +59,17 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
   return bounds;
 }
 
-std::string unknown(const std::string& name, const SeenPose& seen) {
-  return "where " + name + " was is not known for all of this step" +
-         (seen.why_unknown.empty() ? "" : " (" + seen.why_unknown + ")");
+std::string unknown(const std::string& name, const std::string& why) {
+  return "where " + name + " was is not known for all of this step" + (why.empty() ? "" : " (" + why + ")");
+}
+
+/// Has the frame lost a vertex that is to be looked at?
+bool hasLost(const MeshFrame& frame, const Body& body) {
+  const std::vector<Index>& used = frame.topology->usedVertices();
+  return std::any_of(used.begin(), used.end(), [&](Index v) {
+    return !frame.positions[v].allFinite() &&
+           std::find(body.vertex_mask.begin(), body.vertex_mask.end(), v) == body.vertex_mask.end();
+  });
 }
 
 void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
@@ -131,18 +139,23 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
     return static_cast<double>(stamp_ns - step.start_ns) / static_cast<double>(step.stamp_ns - step.start_ns);
   };
   double off_m = 0;
+  bool lost = false;
   for (const std::shared_ptr<const MeshFrame>& frame : frames) {
+    lost = lost || hasLost(*frame, body);
     off_m = std::max(off_m, offPath(*frame, body, fractionAt(frame->stamp_ns)));
     if (!frame->radius_m.empty()) {
       body.radius_m = radii(largerRadii(body.radius_m ? *body.radius_m : std::vector<double>(), frame->radius_m));
     }
     body.dropped_faces = std::max(body.dropped_faces, frame->dropped_faces);
   }
+  if (lost) {
+    addSentence(step.off_path, unknown("body '" + body.name + "'", "a frame between its ends has lost vertices"));
+  }
   const Eigen::AlignedBox3d bounds = seen.empty() ? Eigen::AlignedBox3d() : boundsOf(body);
   const Eigen::Isometry3d from_t0 = body.pose_t0.inverse();
   for (const SeenPose& one : seen) {
     if (!one.pose.matrix().allFinite()) {
-      addSentence(step.off_path, unknown("body '" + body.name + "'", one));
+      addSentence(step.off_path, unknown("body '" + body.name + "'", one.why_unknown));
       break;
     }
     const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionAt(one.stamp_ns));
@@ -160,13 +173,20 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   addSentence(step.off_path, text.str());
 }
 
+/// What came and was not used may have had the body anywhere.
+void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const {
+  const std::string why = stores[body].unknownWithin(from_ns, to_ns);
+  if (!why.empty()) addSentence(step.off_path, unknown("body '" + bodies[body].name + "'", why));
+}
+
 /// A static body and the map are held where they were. What tf said since must not be contradicted in silence.
 void Monitor::Impl::lookAtHeld(Step& step) const {
   const auto of_map = map_seen.find(step.map.frame_id);
   for (std::size_t b = 0; b <= bodies.size(); ++b) {
     const bool is_map = b == bodies.size();
-    if (is_map ? !step.map.surface || of_map == map_seen.end() : stores[b].empty()) continue;
+    if (is_map ? !step.map.surface || of_map == map_seen.end() : isStream(b) || stores[b].empty()) continue;
     const PosesByStamp& seen = is_map ? of_map->second : held_seen[b];
+    const std::string doubt = is_map ? std::string() : stores[b].newest().doubt;
     const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
     double off_m = 0;
     const SeenPose* unknown_at = nullptr;
@@ -183,11 +203,13 @@ void Monitor::Impl::lookAtHeld(Step& step) const {
     }
     const std::string name = is_map ? "the octomap's frame '" + step.map.frame_id + "'"
                                     : "the frame of the static body '" + bodies[b].name + "'";
-    if (unknown_at) addSentence(step.off_path, unknown(name, *unknown_at));
+    if (unknown_at || !doubt.empty()) {
+      addSentence(step.off_path, unknown(name, unknown_at ? unknown_at->why_unknown : doubt));
+    }
     if (off_m <= options.detector.rigid_tolerance_m) continue;
     std::ostringstream text;
-    text << name << " was seen up to " << off_m << " m from where it was at its stamp; set fixed_frame to "
-         << (is_map ? "it" : "what is at rest");
+    text << name << " was seen up to " << off_m << " m from where it was at its stamp; "
+         << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
     addSentence(step.off_path, text.str());
   }
 }
@@ -200,11 +222,17 @@ Step Monitor::Impl::place(const Pending& pending) {
   step.sequence = pending.sequence;
   takeMaps(step.stamp_ns);
   step.map = usableMap(step.stamp_ns);
+  thinned_out.clear();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
     if (!isStream(b)) {
       placeBetween(stores[b].newestShared(), stores[b].newestShared(), body);
       continue;
+    }
+    lookForUnused(b, step.start_ns, step.stamp_ns, step);
+    if (const std::uint64_t count = stores[b].thinnedWithin(step.start_ns, step.stamp_ns); count > 0) {
+      thinned_out.push_back(std::to_string(count) + (count == 1 ? " frame" : " frames") + " of body '" + body.name +
+                            "' by queue_policy: thin");
     }
     if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
       placeBetween(pending.from, pending.to, body);

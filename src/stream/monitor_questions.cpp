@@ -1,5 +1,6 @@
 // What is asked between steps: is anything in contact now, and what would be next if all went on as it does?
 #include <cmath>
+#include <limits>
 
 #include "step/history.h"
 #include "stream/monitor_impl.h"
@@ -35,6 +36,9 @@ Outcome Monitor::checkNow() {
   step.start_ns = step.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   step.map = m.usableMap(step.stamp_ns);
   m.lookAtHeld(step);
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {  // also what came after the newest
+    if (m.isStream(b)) m.lookForUnused(b, m.stores[b].newest().stamp_ns, std::numeric_limits<StampNs>::max(), step);
+  }
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
   Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, Deadline().orWhen(m.cancelled));

@@ -11,10 +11,12 @@ import unittest
 import rosbag
 import rospy
 from attack import AttackTest, checkerboard, octomap, wait_for
-from geometry_msgs.msg import TransformStamped
+from deformable_ccd.msg import MeshStamped
+from geometry_msgs.msg import Point, TransformStamped
 from live_node import Cloud, bytes_of
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2
+from shape_msgs.msg import MeshTriangle
 from tf2_msgs.msg import TFMessage
 
 START = 1700000000
@@ -86,6 +88,152 @@ class ClearTest(AttackTest):
         self.assertGreater(passed_over, 0, 'the map is too small for this machine')
         _, state = self.step_of(at(t + 0.03), 5)
         self.assertTrue(state.clear, state.reason)
+
+    def start_with_finger(self, name, **parameters):
+        """A cloth at 0, a finger 3 m above, and a cloud of another body at 1."""
+        bodies = {'cloth/topic': '/%s/cloth' % name, 'other/topic': '/%s/other' % name,
+                  'finger/rigid': {'frame': 'finger', 'mesh': str(pathlib.Path(__file__).resolve().parents[1] / 'ros/finger.stl')}}
+        self.start_bodies(name, bodies, ['cloth', 'other'], **parameters)
+
+    def step_of_all(self, seconds, z=0.0):
+        self.tf.publish(transform(at(seconds), 'finger', 3))
+        self.to['other'].publish(sheet(at(seconds), 1))
+        return self.step_of(at(seconds), z)
+
+    def assert_unknown(self, outcome, state, body, why):
+        self.assertTrue(outcome.answered)
+        self.assertFalse(state.clear)
+        self.assertIn("where body '%s' was is not known for all of this step" % body, state.reason)
+        self.assertIn(why, state.reason)
+
+    def assert_recovers(self, seconds):
+        """Two steps later at the latest."""
+        self.step_of_all(seconds)
+        _, state = self.step_of_all(seconds + 0.04)
+        self.assertTrue(state.clear, state.reason)
+
+    def test_a_finger_that_loses_its_transform(self):
+        """3 m away; meanwhile four frames of the cloth, which are refused for it, lie beyond the other sheet."""
+        self.start_with_finger('lost', transform_timeout_s=0.05)
+        self.step_of_all(0)
+        _, state = self.step_of_all(0.04)
+        self.assertTrue(state.clear, state.reason)
+        for k in range(4):
+            t = at(0.04 + 0.09 * (k + 1))
+            self.to['other'].publish(sheet(t, 1))
+            outcome, state = self.step_of(t, 2)
+            self.assertFalse(outcome.answered)
+        outcome, state = self.step_of_all(0.5)
+        self.assert_unknown(outcome, state, 'cloth', '4 frames of it that came were not used: NO_TRANSFORM')
+        self.assert_recovers(0.54)
+
+    def test_transforms_that_are_none_and_two_of_one_stamp(self):
+        self.start_with_finger('twice')
+        self.step_of_all(0)
+        t = 0.04
+        for what in ('rotation', 'not finite', 'two publishers'):
+            _, state = self.step_of_all(t)
+            self.assertTrue(state.clear, state.reason)
+            bad = transform(at(t if what == 'two publishers' else t + 0.02), 'finger', 3.4)
+            if what == 'rotation':
+                bad.transforms[0].transform.rotation.w = 1.2
+            elif what == 'not finite':
+                bad.transforms[0].transform.translation.z = math.nan
+            self.tf.publish(bad)
+            outcome, state = self.step_of_all(t + 0.04)
+            self.assert_unknown(outcome, state, 'finger', "a transform of frame 'finger' came")
+            self.assert_recovers(t + 0.08)
+            t += 0.16
+
+    def test_frames_of_another_body_that_cannot_be_used(self):
+        self.start_with_finger('bad')
+        self.step_of_all(0)
+        t = 0.04
+        for what in ('cut', 'lost vertices', 'without a transform', 'the same stamp, elsewhere'):
+            _, state = self.step_of_all(t)
+            self.assertTrue(state.clear, state.reason)
+            bad = sheet(at(t + 0.02), 1)
+            if what == 'cut':
+                bad.data = bad.data[:-1]
+            elif what == 'lost vertices':
+                bad = sheet(at(t + 0.02), math.nan)
+            elif what == 'without a transform':
+                bad = sheet(at(t + 0.02), 1, 'nowhere')
+            else:
+                bad = sheet(at(t), 1.4)
+            self.to['other'].publish(bad)
+            outcome, state = self.step_of_all(t + 0.04)
+            self.assert_unknown(outcome, state, 'other', 'lost vertices' if what == 'lost vertices' else 'not used: ')
+            self.assert_recovers(t + 0.08)
+            t += 0.16
+
+    def test_an_index_out_of_range(self):
+        self.start_bodies('index', {'cloth/topic': '/index/cloth', 'other/topic': '/index/other'}, ['cloth'])
+        other = self.advertise('/index/other', MeshStamped, 100)
+
+        def step(seconds, bad=False):
+            for index in (99, 2) if bad else (2,):
+                mesh = MeshStamped(vertices=[Point(x, y, 1) for x, y in ((0, 0), (0.1, 0), (0, 0.1))], triangles=[MeshTriangle((0, 1, index))])
+                mesh.header.stamp, mesh.header.frame_id = at(seconds - (0.02 if index == 99 else 0)), 'world'
+                other.publish(mesh)
+            return self.step_of(at(seconds))
+        step(0)
+        self.assertTrue(step(0.04)[1].clear)
+        outcome, state = step(0.08, bad=True)
+        self.assert_unknown(outcome, state, 'other', '1 frame of it that came was not used: BAD_MESSAGE')
+        self.assertTrue(step(0.12)[1].clear)
+
+    def test_bursts_at_a_full_queue(self):
+        """Twelve frames come at once, before the transform of the first; of those that are dropped two are beyond the other sheet."""
+        for policy in ('newest', 'thin'):
+            name = 'burst_' + policy
+            self.start_bodies(name, {'cloth/topic': '/%s/cloth' % name}, ['cloth'], queue_size=8, queue_policy=policy,
+                              transform_timeout_s=60.0, answer_timeout_s=60.0, max_step_s=60.0)
+            burst = [at(0.04 * k) for k in range(14)]
+            for t in burst[:2]:
+                self.tf.publish(transform(t, 'camera'))
+                self.outcomes_of(self.to['cloth'], [sheet(t, 0, 'camera')])
+            seen = len(self.contacts)
+            for k, t in enumerate(burst[2:]):
+                self.to['cloth'].publish(sheet(t, 2 if k in (1, 2) else 0, 'camera'))
+            time.sleep(0.5)
+            self.assertEqual(len(self.contacts), seen)
+            said = len(self.states)
+            self.tf.publish(TFMessage([transform(t, 'camera').transforms[0] for t in burst[2:]]))
+            wait_for(lambda: len(self.contacts) >= seen + 9, 20, 'nine of the twelve')
+            after = next(s for s in self.states[said:] if s.holds_until > burst[2])
+            if policy == 'newest':
+                self.assert_unknown(self.contacts[seen + 1], after, 'cloth', 'not used: QUEUE_FULL')
+            else:
+                self.assertTrue(after.clear, after.reason)
+                self.assertIn("3 frames of body 'cloth' by queue_policy: thin", after.excluded)
+            self.assertTrue(self.states[-1].clear, self.states[-1].reason)
+
+    def test_a_static_transform_that_is_sent_again(self):
+        """0.5 m higher, or in steps of 0.9 mm: of what is carried by it one step, of what is held by it all until it comes again."""
+        for k, by in enumerate((0.5, 0.0009)):
+            name = 'static_%d' % k
+            self.start_bodies(name, {'cloth/topic': '/%s/cloth' % name, 'table/topic': '/%s/table' % name, 'table/motion': 'static'}, ['cloth', 'table'])
+            fixed = self.advertise('/tf_static', TFMessage, 100)
+            fixed.publish(transform(at(0), 'stand_%d' % k, 1))
+            time.sleep(0.2)
+            self.to['table'].publish(sheet(at(0), 1, 'stand_%d' % k))
+            time.sleep(0.2)
+            self.step_of(at(0))
+            _, state = self.step_of(at(0.04))
+            self.assertTrue(state.clear, state.reason)
+            for i in range(3):
+                fixed.publish(transform(at(0.05), 'stand_%d' % k, 1 + by * (i + 1)))
+            time.sleep(0.3)
+            for i in range(3):
+                _, state = self.step_of(at(0.08 + 0.04 * i))
+                self.assertFalse(state.clear)
+                self.assertIn("the frame of the static body 'table' was", state.reason)
+            self.to['table'].publish(sheet(at(0.2), 1, 'stand_%d' % k))
+            time.sleep(0.2)
+            self.step_of(at(0.2))
+            _, state = self.step_of(at(0.24))
+            self.assertTrue(state.clear, state.reason)
 
     def test_live_and_from_a_bag(self):
         """A crumpled cloth in a frame that turns; live the newest transform is the frame's own, in a bag later ones are known."""

@@ -204,6 +204,16 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.states[-1].clear)
         self.assert_consistent()
 
+    def test_simulated_time_without_a_clock(self):
+        """The true clock is the last resort: a tracker that dies is noticed all the same."""
+        with simulated_time():
+            self.start_node('no_clock')
+            stream = self.stream(Sheet())
+            self.wait_proved()
+            stream.end()
+            self.wait_missing('no frame has come')
+        self.assert_consistent()
+
     # rosbag play, at several rates and paused: the watchdog lives in the bag's time.
 
     @staticmethod

@@ -30,6 +30,29 @@ TEST(InputQueue, NewestKeepsTheLast) { EXPECT_EQ(leftOfFour(QueuePolicy::NEWEST)
 
 TEST(InputQueue, OldestKeepsTheFirst) { EXPECT_EQ(leftOfFour(QueuePolicy::OLDEST), (std::vector<StampNs>{1, 2})); }
 
+// What was left out by choice is told by what comes next; of what was lost only the numbers tell.
+TEST(InputQueue, ThinSaysHowManyItLeftOut) {
+  for (const QueuePolicy policy : {QueuePolicy::THIN, QueuePolicy::NEWEST, QueuePolicy::OLDEST}) {
+    const bool thin = policy == QueuePolicy::THIN;
+    for (const std::size_t capacity : {1, 2}) {
+      InputQueue queue(1, capacity, policy);
+      std::uint64_t thinned = 0, taken = 0;
+      for (int k = 0; k < 9; ++k) {
+        queue.push(0, {});
+        MeshMessage message;
+        if (k % 4 != 3) continue;
+        while (queue.pop(0, message)) thinned += message.thinned, ++taken;
+      }
+      EXPECT_EQ(taken, 2 * capacity);
+      EXPECT_EQ(thinned, thin ? 8 - taken : 0u);
+      EXPECT_EQ(queue.takeDropped()[0], 8 - taken);
+      MeshMessage last;
+      ASSERT_TRUE(queue.pop(0, last));
+      EXPECT_EQ(last.thinned, 0u) << "nothing was left out before it";
+    }
+  }
+}
+
 /// Bytes of what is left in two queues for 100 bytes in all, and how many were dropped of each.
 TEST(InputQueue, BytesAreBoundedOverAllBodies) {
   const auto message = [](std::size_t bytes) {

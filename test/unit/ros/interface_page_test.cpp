@@ -219,7 +219,7 @@ Defaults inForceOfTheNode() {
           {"patch_gap_s", plain(monitor.patch_gap_s)},
           {"sync_timeout_s", plain(monitor.sync_timeout_s)},
           {"queue_size", plain(config.queue_size)},
-          {"queue_policy", config.queue_policy == QueuePolicy::NEWEST ? "newest" : "oldest"},
+          {"queue_policy", config.queue_policy == QueuePolicy::NEWEST ? "newest" : "other"},
           {"rigid_tolerance_m", plain(detector.rigid_tolerance_m)},
           {"max_substeps", plain(detector.max_substeps)},
           {"effects/NAME", toString(config.effects.at(Effect::SELF_COLLISION))},

@@ -187,6 +187,23 @@ TEST(WatchClockTest, TimeThatRunsBackwardsPasses) {
   EXPECT_LT(backwards_s, 20) << "a jump back is no long silence";
 }
 
+// /use_sim_time, and nobody who sends /clock: there is nothing else to go by.
+TEST(WatchClockTest, BeforeTheFirstClockTrueTimePasses) {
+  ros::Time::init();
+  ros::Time::setNow(ros::Time());
+  WatchClock watch;
+  const std::int64_t begin_ns = watch.now();
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  const std::int64_t passed_ns = watch.now() - begin_ns;
+  EXPECT_GE(passed_ns, 30 * MS);
+  EXPECT_LT(passed_ns, 20000 * MS);
+  ros::Time::setNow(ros::Time(10000));
+  EXPECT_EQ(watch.now() - begin_ns, passed_ns) << "from there to the first one nothing does";
+  ros::Time::setNow(ros::Time(10001));
+  EXPECT_EQ(watch.now() - begin_ns, passed_ns + 1000 * MS);
+  ros::Time::useSystemTime();
+}
+
 TEST(Liveness, WhatIsAskedForHoldsUntilItIsDone) {
   Liveness liveness({0.1, 0.1, 0});
   liveness.frame(1, 0);

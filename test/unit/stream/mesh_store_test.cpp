@@ -55,7 +55,75 @@ TEST_F(MeshStoreTest, RefusesAVertexCountThatDoesNotFit) {
   MeshFrame wrong = frame(10 * MS);
   wrong.positions.pop_back();
   EXPECT_EQ(store.push(wrong), StepStatus::VERTEX_COUNT);
-  EXPECT_EQ(store.push(frame(20 * MS)), StepStatus::OK) << "the refused frame leaves no trace";
+  EXPECT_EQ(store.push(frame(20 * MS)), StepStatus::OK);
+  EXPECT_EQ(store.unknownWithin(0, 20 * MS), "1 frame of it that came was not used: VERTEX_COUNT");
+  EXPECT_EQ(store.push(frame(30 * MS)), StepStatus::OK);
+  EXPECT_EQ(store.unknownWithin(20 * MS, 30 * MS), "") << "the refused frame leaves no other trace";
+}
+
+TEST_F(MeshStoreTest, KnowsTheWayBetweenTwoFramesIfNoneIsMissingBetweenThem) {
+  const auto numbered = [&](StampNs stamp_ns, std::uint64_t number, std::uint64_t thinned = 0) {
+    MeshFrame one = frame(stamp_ns);
+    one.number = number;
+    one.thinned = thinned;
+    return one;
+  };
+  store.push(numbered(0, 5));
+  store.push(numbered(10 * MS, 6));
+  EXPECT_EQ(store.unknownWithin(0, 10 * MS), "") << "what came before the first is missed by nobody";
+  store.push(numbered(20 * MS, 9));
+  const std::string lost = "2 frames of it that came were not used: lost on the way here";
+  for (const auto& [from, to] : {std::pair<StampNs, StampNs>{10, 20}, {19, 20}, {10, 11}, {12, 15}, {0, 11}}) {
+    EXPECT_EQ(store.unknownWithin(from * MS, to * MS), lost) << from << " " << to;
+  }
+  EXPECT_EQ(store.unknownWithin(0, 10 * MS), "");
+  store.push(numbered(30 * MS, 12, 2));
+  EXPECT_EQ(store.unknownWithin(20 * MS, 30 * MS), "") << "two were left out by choice";
+  EXPECT_EQ(store.thinnedWithin(20 * MS, 30 * MS), 2u);
+  EXPECT_EQ(store.thinnedWithin(10 * MS, 20 * MS), 0u);
+  store.push(numbered(40 * MS, 15, 1));
+  EXPECT_NE(store.unknownWithin(30 * MS, 40 * MS), "") << "one of two was";
+  store.passOver(1, "BAD_MESSAGE: cut");
+  EXPECT_EQ(store.unknownWithin(30 * MS + 1, 40 * MS + 1),
+            "1 frame of it that came was not used: lost on the way here");
+  EXPECT_EQ(store.unknownWithin(40 * MS, 41 * MS), "1 frame of it that came was not used: BAD_MESSAGE: cut");
+  EXPECT_EQ(store.unknownWithin(40 * MS, 40 * MS), "");
+  store.push(numbered(50 * MS, 16));
+  EXPECT_EQ(store.unknownWithin(40 * MS, 50 * MS), "") << "the number tells that it was none of this body's";
+  store.push(numbered(160 * MS, 30));
+  EXPECT_EQ(store.unknownWithin(0, 160 * MS).find("13 frames"), std::string::npos) << "nothing goes on over a gap";
+}
+
+TEST_F(MeshStoreTest, TheSameFrameOnceMoreIsNotMissedAndAnotherOfItsStampIs) {
+  MeshFrame lost = frame(10 * MS);
+  lost.positions[1].setConstant(std::numeric_limits<double>::quiet_NaN());
+  for (const bool same : {true, false}) {
+    store.clear();
+    store.push(frame(0));
+    store.push(lost);
+    for (int again = 0; again < 2; ++again) {
+      EXPECT_EQ(store.push(same ? lost : frame(10 * MS, 0.1)), StepStatus::DUPLICATE);
+      EXPECT_EQ(store.unknownWithin(0, 10 * MS).empty(), same);
+      EXPECT_EQ(store.unknownWithin(10 * MS, 11 * MS).empty(), same);
+    }
+    store.push(frame(20 * MS));
+    EXPECT_EQ(store.unknownWithin(10 * MS, 20 * MS).empty(), same);
+    store.push(frame(30 * MS));
+    EXPECT_EQ(store.unknownWithin(20 * MS, 30 * MS), "");
+  }
+}
+
+TEST_F(MeshStoreTest, AFrameInDoubtIsSoToBothSides) {
+  store.push(frame(0));
+  MeshFrame doubted = frame(10 * MS);
+  doubted.doubt = "why";
+  store.push(doubted);
+  EXPECT_EQ(store.unknownWithin(10 * MS, 11 * MS), "why");
+  store.push(frame(20 * MS));
+  EXPECT_EQ(store.unknownWithin(0, 10 * MS), "why");
+  EXPECT_EQ(store.unknownWithin(10 * MS, 20 * MS), "why");
+  store.push(frame(30 * MS));
+  EXPECT_EQ(store.unknownWithin(20 * MS, 30 * MS), "");
 }
 
 TEST_F(MeshStoreTest, TellsAnotherTopologyFromAnEqualOne) {

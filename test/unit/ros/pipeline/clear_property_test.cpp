@@ -103,16 +103,24 @@ class World {
     tracks_[name].say(stamp_ns, static_cast<double>(static_cast<float>(z)));
     send(name, stamp_ns, z);
   }
-  void transformTo(const std::string& frame, StampNs stamp_ns, double z, const std::string& parent = "world") {
+  /// What is there, but comes as nothing that can be used.
+  void sayInVain(const std::string& name, StampNs stamp_ns, double z) {
+    tracks_[name].say(stamp_ns, z);
+    send(name, stamp_ns, z, true);
+  }
+  void tell(const std::string& frame, StampNs stamp_ns, double z, const std::string& parent, double rotation_w = 1) {
     geometry_msgs::TransformStamped transform;
     transform.header.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns));
     transform.header.frame_id = parent;
     transform.child_frame_id = frame;
     transform.transform.translation.z = z;
-    transform.transform.rotation.w = 1;
+    transform.transform.rotation.w = rotation_w;
     tf2_msgs::TFMessage message;
     message.transforms.push_back(transform);
     driven_.feed_tf.add(message, false);
+  }
+  void transformTo(const std::string& frame, StampNs stamp_ns, double z, const std::string& parent = "world") {
+    tell(frame, stamp_ns, z, parent);
     tracks_[frame].say(stamp_ns, z);
   }
   /// An arm takes the finger and lays it down again. It is not sent each time, but goes where its parent does.
@@ -127,7 +135,17 @@ class World {
       in_parent_ = (at_rest_ ? finger_ : level()) - (on_arm_ ? arm_ : 0);
       transformTo("finger", t, in_parent_, on_arm_ ? "arm" : "world");
     }
+    const std::string parent = on_arm_ ? "arm" : "world";
+    if (chance(100)) {  // it goes away and comes back in a transform that is none
+      tracks_["finger"].say(t - 5 * MS, level());
+      tell("finger", t - 5 * MS, level(), parent, 1.2);
+    }
     tracks_["finger"].say(t, in_parent_ + (on_arm_ ? arm : 0));
+    if (sent_ && chance(100)) {  // another publisher has it elsewhere
+      tell("finger", t, in_parent_ + 0.4, parent);
+      tracks_["finger"].say(t + 1, in_parent_ + 0.4 + (on_arm_ ? arm : 0));
+      tracks_["finger"].say(t + 2, in_parent_ + (on_arm_ ? arm : 0));
+    }
   }
   void giveMap(StampNs stamp_ns, const std::string& frame = "odom") {
     LoadedMap loaded = decodeMapMessage(map(1), driven_.config);
@@ -153,7 +171,7 @@ class World {
       say("other", now - TICK - static_cast<StampNs>(random_() % 3) * 10 * MS - 1, other_);
     }
     if (chance(6)) say("other", now - 20 * MS, chance(3) ? level() : other_);
-    if (chance(15)) send("other", now - 5 * MS, level(), true);
+    if (chance(15)) sayInVain("other", now - 5 * MS, level());
     if (!chance(20)) say("other", now, other_);
     if (chance(12)) {
       table_refused_ = chance(2);
@@ -184,7 +202,7 @@ class World {
     }
     if (chance(25)) cloth_ = level() / 4;
     if (chance(25)) {
-      send("cloth", now, 0, true);
+      sayInVain("cloth", now, level() / 4);
     } else {
       say("cloth", now, cloth_);
     }
@@ -231,8 +249,10 @@ class World {
   int judge(const std::string& name, StampNs from, StampNs to) const {
     int side = 0;
     std::vector<StampNs> times{from, to};
-    for (const auto& [stamp_ns, z] : tracks_.at(name).z) {
-      if (stamp_ns > from && stamp_ns < to) times.push_back(stamp_ns);
+    for (const std::string& moved : {name, std::string("cloth")}) {
+      for (const auto& [stamp_ns, z] : tracks_.at(moved).z) {
+        if (stamp_ns > from && stamp_ns < to) times.push_back(stamp_ns);
+      }
     }
     for (const StampNs t : times) {
       const int now = sideAt(name, t);
