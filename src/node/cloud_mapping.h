@@ -38,9 +38,9 @@ class CloudMapping {
   std::string frame_;
   std::optional<CloudMap> map_;
 
-  /// The points that are finite and where the sensor was, in the map's frame. Throws.
-  Positions place(const std::vector<std::uint8_t>& bytes, StampNs receipt_ns, const std::function<bool()>& may_wait,
-                  LoadedMap& map, Vec3& sensor) const;
+  /// What the sensor saw, and where it was; returns the points that the view names. Throws.
+  std::vector<float> place(const std::vector<std::uint8_t>& bytes, StampNs receipt_ns,
+                           const std::function<bool()>& may_wait, LoadedMap& map, SensorView& view) const;
 };
 
 }  // namespace dccd

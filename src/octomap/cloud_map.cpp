@@ -1,8 +1,11 @@
 #include "dccd/cloud_map.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <octomap/OcTree.h>
@@ -72,13 +75,15 @@ void walk(const octomap::OcTree& tree, const octomap::OcTreeNode& node, const Oc
 }  // namespace
 
 struct CloudMap::Impl {
+  CloudMapOptions options;
   octomap::OcTree tree;
-  float max_range_m;
+  double fill_m, clear_m;  // how far away points fill, and rays clear
+  std::vector<OccupiedLeaf> doubtful;
   octomap::KeyRay ray;
 
-  explicit Impl(const CloudMapOptions& options) : tree(options.resolution_m) {
-    const double longest_m = MOST_RAY_VOXELS * options.resolution_m;
-    max_range_m = static_cast<float>(options.max_range_m > 0 ? std::min(options.max_range_m, longest_m) : longest_m);
+  explicit Impl(const CloudMapOptions& of) : options(of), tree(of.resolution_m) {
+    fill_m = options.max_range_m > 0 ? options.max_range_m : std::numeric_limits<double>::infinity();
+    clear_m = std::min(fill_m, MOST_RAY_VOXELS * options.resolution_m);
     tree.setProbHit(options.hit);
     tree.setProbMiss(options.miss);
     tree.setClampingThresMin(options.min);
@@ -100,42 +105,110 @@ CloudMap::CloudMap(const CloudMapOptions& options) : impl_(std::make_unique<Impl
 CloudMap::~CloudMap() = default;
 
 std::size_t CloudMap::memoryBytes() const { return impl_->tree.size() * NODE_BYTES; }
+const std::vector<OccupiedLeaf>& CloudMap::doubtful() const { return impl_->doubtful; }
 
 std::vector<std::int8_t> CloudMap::serialized(bool binary) const { return dccd::serialized(impl_->tree, binary); }
 
-void CloudMap::insert(const Vec3& sensor, const Positions& points, std::size_t max_bytes) {
+SeenCounts CloudMap::insert(const SensorView& view, std::size_t max_bytes) {
   octomap::OcTree& tree = impl_->tree;
+  const CloudMapOptions& options = impl_->options;
+  const Vec3 sensor = view.map_from_sensor.translation();
   const point3d origin = pointOf(sensor);
   OcTreeKey key;
-  if (!impl_->keyOf(origin, key)) {
+  const auto refuse = [&](const char* what, const Vec3& at) {
     std::ostringstream text;
-    text << "the sensor is at (" << sensor.x() << ' ' << sensor.y() << ' ' << sensor.z()
-         << ") m, beyond the 65536 voxels of " << tree.getResolution() << " m that a map can span";
+    text << what << " (" << at.x() << ' ' << at.y() << ' ' << at.z() << ") m, beyond the 65536 voxels of "
+         << tree.getResolution() << " m that a map can span";
     throw OctomapError(text.str());
-  }
+  };
+  if (!impl_->keyOf(origin, key)) refuse("the sensor is at", sensor);
   VoxelSet free, occupied;
   const auto checkRoom = [&] {
     if (memoryBytes() + free.memoryBytes() + occupied.memoryBytes() <= max_bytes) return;
     throw OctomapError("the octree of all clouds needs more than the " + std::to_string(max_bytes >> 20) +
                        " MB that it may take");
   };
-  for (const Vec3& p : points) {
-    point3d end = pointOf(p);
-    const bool in_range = (end - origin).norm() <= impl_->max_range_m;
-    if (!in_range) end = origin + (end - origin).normalized() * impl_->max_range_m;
+  SeenCounts counts;
+  counts.is_picture = view.depth_m != nullptr;
+  counts.cleared = view.clears;
+  counts.no_return_cleared = view.clears && options.no_return_clears && counts.is_picture;
+  const auto isInBox = [&](const Vec3& p) {
+    return !options.box ||
+           ((p.array() >= options.box->min.array()).all() && (p.array() <= options.box->max.array()).all());
+  };
+  std::vector<Vec3> fills;
+  std::vector<std::pair<Vec3, bool>> rays;
+  for (std::size_t i = 0; i < view.width * view.height; ++i) {
+    Vec3 p;
+    if (view.depth_m) {
+      const Pinhole& lens = view.pinhole;
+      const double z = static_cast<double>(view.depth_m[i]);
+      const Vec3 way((static_cast<double>(i % view.width) - lens.cx) / lens.fx,
+                     (static_cast<double>(i / view.width) - lens.cy) / lens.fy, 1);
+      if (!(z > 0)) {
+        ++(z <= 0 && std::isfinite(z) ? counts.near : counts.nothing);
+        continue;
+      }
+      if (std::isinf(z)) {
+        ++counts.no_return;
+        if (counts.no_return_cleared) rays.emplace_back(view.map_from_sensor * (way * (2 * impl_->clear_m)), false);
+        continue;
+      }
+      p = way * z;
+    } else {
+      p = Vec3(view.xyz[3 * i], view.xyz[3 * i + 1], view.xyz[3 * i + 2]);
+      if (!p.allFinite()) {
+        ++(p.array().isInf().any() ? counts.no_return : counts.nothing);
+        continue;
+      }
+    }
+    const double depth = p.norm();
+    if (p.isZero(0) || depth < options.min_range_m) {
+      ++counts.near;
+      continue;
+    }
+    const Vec3 at = view.map_from_sensor * p;
+    const bool is_far = depth > impl_->fill_m, is_in = isInBox(at);
+    ++(is_far ? counts.far : is_in ? counts.filled : counts.outside);
+    if (!is_far && is_in) {
+      if (!impl_->keyOf(pointOf(at), key)) refuse("a point lies at", at);
+      fills.push_back(at);
+    }
+    rays.emplace_back(at, depth <= impl_->clear_m);
+  }
+  for (const Vec3& p : fills) {
+    if (impl_->keyOf(pointOf(p), key)) occupied.add(key);
+  }
+  for (const auto& [to, ends] : rays) {
+    if (!view.clears) break;
+    const point3d end = ends ? pointOf(to) : pointOf(sensor + (to - sensor).normalized() * impl_->clear_m);
     if (!impl_->keyOf(end, key) || !tree.computeRayKeys(origin, end, impl_->ray)) continue;
     for (const OcTreeKey& passed : impl_->ray) free.add(passed);
-    if (in_range) occupied.add(key);
+    if (!ends) free.add(key);
     checkRoom();
   }
+  std::vector<std::pair<std::uint64_t, OccupiedLeaf>> doubtful;
+  for (const OccupiedLeaf& leaf : impl_->doubtful) doubtful.emplace_back(codeOf(leaf), leaf);
   const auto update = [&](bool is_occupied) {
     return [&, is_occupied](const OcTreeKey& voxel) {
-      tree.updateNode(voxel, is_occupied);
+      if (options.box &&
+          !isInBox(Vec3(tree.keyToCoord(voxel[0]), tree.keyToCoord(voxel[1]), tree.keyToCoord(voxel[2]))))
+        return;
+      const octomap::OcTreeNode* node = tree.updateNode(voxel, is_occupied);
+      const OccupiedLeaf leaf{{voxel[0], voxel[1], voxel[2]}, 1};
+      const std::uint64_t code = codeOf(leaf);
+      doubtful.erase(std::remove_if(doubtful.begin(), doubtful.end(), [&](const auto& d) { return d.first == code; }),
+                     doubtful.end());
+      if (is_occupied && !tree.isNodeOccupied(node)) doubtful.emplace_back(code, leaf);
       checkRoom();
     };
   };
   free.forEach(occupied, update(false));
   occupied.forEach({}, update(true));
+  std::sort(doubtful.begin(), doubtful.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  impl_->doubtful.clear();
+  for (const auto& [code, leaf] : doubtful) impl_->doubtful.push_back(leaf);
+  return counts;
 }
 
 DecodedOctomap CloudMap::leaves(const OctomapLimits& limits) const {

@@ -39,14 +39,15 @@ int serve(int argc, char** argv, double slow_s) {
       node.subscribe<sensor_msgs::PointCloud2>("/served/points", 1, [&](const sensor_msgs::PointCloud2ConstPtr& cloud) {
         if ((cloud->header.stamp - camera.header.stamp).toSec() > 0.1) return;
         const auto& at = camera.transform.translation;
-        const Vec3 sensor(at.x, at.y, at.z);
-        Positions points;
-        for (std::size_t i = 0; i < cloud->width * cloud->height; ++i) {
-          float p[3];
-          std::memcpy(p, &cloud->data[i * cloud->point_step], sizeof p);
-          points.push_back(sensor + Vec3(p[0], p[1], p[2]));
+        SensorView view;
+        view.map_from_sensor.translation() = Vec3(at.x, at.y, at.z);
+        view.width = cloud->width * cloud->height;
+        std::vector<float> xyz(3 * view.width);
+        for (std::size_t i = 0; i < view.width; ++i) {
+          std::memcpy(&xyz[3 * i], &cloud->data[i * cloud->point_step], 3 * sizeof(float));
         }
-        map.insert(sensor, points, std::numeric_limits<std::size_t>::max());
+        view.xyz = xyz.data();
+        map.insert(view, std::numeric_limits<std::size_t>::max());
         octomap_msgs::Octomap message;
         message.header = cloud->header;
         message.header.frame_id = "world";

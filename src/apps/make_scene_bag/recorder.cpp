@@ -148,11 +148,12 @@ class CameraRecorder {
     const ros::Time told = stamp + ros::Duration(camera.lag_s);
     const auto seq = static_cast<std::uint32_t>(clouds_++);
     bag_.write(camera.topic, told, toImageCloud(header(camera.frame, stamp, seq), points, camera.width));
-    Positions seen;
-    for (const Eigen::Vector3f& p : points) {
-      if (p.allFinite()) seen.push_back(camera.pose * p.cast<double>());
-    }
-    map_.insert(camera.pose.translation(), seen, std::numeric_limits<std::size_t>::max());
+    SensorView view;
+    view.map_from_sensor = camera.pose;
+    view.width = static_cast<std::size_t>(camera.width);
+    view.height = points.size() / view.width;
+    view.xyz = points.data()->data();
+    map_.insert(view, std::numeric_limits<std::size_t>::max());
     bag_.write(spec_.obstacle->topic, told,
                toOctomap(header(spec_.obstacle->frame, stamp, seq), spec_.obstacle->resolution_m,
                          map_.serialized(binary_), binary_));

@@ -22,6 +22,19 @@ CloudMapOptions tenCentimetres() {
   return options;
 }
 
+/// Points in the map's frame that a sensor saw there.
+SeenCounts insert(CloudMap& map, const Vec3& sensor, const Positions& points, std::size_t max_bytes = PLENTY) {
+  std::vector<float> xyz;
+  for (const Vec3& p : points) {
+    for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(p[axis] - sensor[axis]));
+  }
+  SensorView view;
+  view.map_from_sensor.translation() = sensor;
+  view.width = points.size();
+  view.xyz = xyz.data();
+  return map.insert(view, max_bytes);
+}
+
 /// A sensor in the middle of a room with a floor and some boxes, to which depth adds noise.
 Positions someCloud(std::mt19937& random, const Vec3& sensor) {
   std::uniform_real_distribution<double> unit(0, 1), angle(-3, 3);
@@ -75,7 +88,7 @@ TEST(CloudMap, IsWhatLiboctomapMakesOfTheSameClouds) {
       const octomap::point3d origin(static_cast<float>(sensor.x()), static_cast<float>(sensor.y()),
                                     static_cast<float>(sensor.z()));
       tree.insertPointCloud(cloud, origin, range_m > 0 ? range_m : -1);
-      map.insert(sensor, points, PLENTY);
+      insert(map, sensor, points);
       const DecodedOctomap expected = decoded(tree), found = map.leaves();
       ASSERT_TRUE(same(found.occupied, expected.occupied)) << "cloud " << i << ", range " << range_m;
       ASSERT_TRUE(same(found.free, expected.free)) << "cloud " << i << ", range " << range_m;
@@ -93,7 +106,7 @@ TEST(CloudMap, IsWhatLiboctomapMakesOfTheSameClouds) {
 
 TEST(CloudMap, ARayClearsUpToThePointThatItFills) {
   CloudMap map(tenCentimetres());
-  map.insert({0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}}, PLENTY);
+  insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}});
   const DecodedOctomap found = map.leaves();
   ASSERT_EQ(found.occupied.size(), 1u);
   EXPECT_EQ(found.occupied[0].min.x, keyOf(0.95));
@@ -106,7 +119,7 @@ TEST(CloudMap, WhatLiesBeyondTheRangeOnlyClears) {
   CloudMapOptions options = tenCentimetres();
   options.max_range_m = 0.5;
   CloudMap map(options);
-  map.insert({0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}}, PLENTY);
+  insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}});
   const DecodedOctomap found = map.leaves();
   EXPECT_TRUE(found.occupied.empty());
   ASSERT_EQ(found.free.size(), 5u);
@@ -122,30 +135,30 @@ TEST(CloudMap, AVoxelIsClearedAsSoonAsTheModelSaysSo) {
     }
     return false;
   };
-  map.insert({0.05, 0.05, 0.05}, {{0.45, 0.05, 0.05}}, PLENTY);
+  insert(map, {0.05, 0.05, 0.05}, {{0.45, 0.05, 0.05}});
   for (int misses = 0; misses < 3; ++misses) {
     EXPECT_TRUE(isOccupied()) << misses;
-    map.insert({0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}}, PLENTY);
+    insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}});
   }
   EXPECT_FALSE(isOccupied());
 }
 
 TEST(CloudMap, APointWinsOverTheRaysOfTheSameCloud) {
   CloudMap map(tenCentimetres());
-  map.insert({0.05, 0.05, 0.05}, {{0.45, 0.05, 0.05}, {0.95, 0.05, 0.05}, {0.95, 0.051, 0.05}}, PLENTY);
+  insert(map, {0.05, 0.05, 0.05}, {{0.45, 0.05, 0.05}, {0.95, 0.05, 0.05}, {0.95, 0.051, 0.05}});
   // Had the rays counted, too, two misses would be enough.
-  for (int i = 0; i < 2; ++i) map.insert({0.05, 0.05, 0.05}, {{0.75, 0.05, 0.05}}, PLENTY);
+  for (int i = 0; i < 2; ++i) insert(map, {0.05, 0.05, 0.05}, {{0.75, 0.05, 0.05}});
   EXPECT_EQ(map.leaves().occupied.size(), 3u);
 }
 
 TEST(CloudMap, WhatNoMapCanSpanIsLeftOutOrRefused) {
   CloudMap map(tenCentimetres());  // +- 3276.8 m
   testing::internal::CaptureStderr();
-  map.insert({3276, 0, 0}, {{3277, 0, 0}, {3276, 1e30, 0}, {-1e300, 0, 0}, {3276.55, 0, 0}}, PLENTY);
+  insert(map, {3276, 0, 0}, {{3277, 0, 0}, {3276, 1e30, 0}, {-1e300, 0, 0}, {3276.55, 0, 0}});
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "OctoMap complains on the console";
   EXPECT_EQ(map.leaves().occupied.size(), 1u);
-  EXPECT_THROW(map.insert({3277, 0, 0}, {{3276, 0, 0}}, PLENTY), OctomapError);
-  EXPECT_THROW(map.insert({1e300, 0, 0}, {{3276, 0, 0}}, PLENTY), OctomapError);
+  EXPECT_THROW(insert(map, {3277, 0, 0}, {{3276, 0, 0}}), OctomapError);
+  EXPECT_THROW(insert(map, {1e300, 0, 0}, {{3276, 0, 0}}), OctomapError);
 }
 
 TEST(CloudMap, NeedsNoMoreThanItMay) {
@@ -155,7 +168,7 @@ TEST(CloudMap, NeedsNoMoreThanItMay) {
   CloudMap map(options);
   const std::size_t limit = std::size_t{2} << 20;
   const Positions points = someCloud(random, Vec3::Zero());
-  const std::string text = test::said<OctomapError>([&] { map.insert(Vec3::Zero(), points, limit); });
+  const std::string text = test::said<OctomapError>([&] { insert(map, Vec3::Zero(), points, limit); });
   EXPECT_EQ(text, "the octree of all clouds needs more than the 2 MB that it may take");
   EXPECT_LE(map.memoryBytes(), limit);
 }
