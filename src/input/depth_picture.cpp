@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
 #include "input/short_text.h"
@@ -12,7 +11,6 @@ namespace dccd {
 namespace {
 
 constexpr std::size_t MOST_TOLD = 32;  // characters of an encoding
-constexpr float NOTHING = std::numeric_limits<float>::quiet_NaN();
 
 template <class T>
 T numberAt(const std::uint8_t* at, bool big_endian) {
@@ -25,14 +23,17 @@ T numberAt(const std::uint8_t* at, bool big_endian) {
 
 }  // namespace
 
-float DepthView::depth(std::size_t i) const {
-  const std::uint8_t* at = data + (i / width) * row_step + (i % width) * (in_millimetres ? 2 : 4);
-  if (in_millimetres) {
-    const auto millimetres = numberAt<std::uint16_t>(at, big_endian);
-    return millimetres == 0 ? NOTHING : 0.001f * millimetres;
+void DepthView::depthsInto(std::vector<float>& depths) const {
+  depths.resize(size());
+  float* out = depths.data();
+  for (std::size_t row = 0; row < height; ++row) {
+    const std::uint8_t* at = data + row * row_step;
+    if (in_millimetres) {
+      for (std::size_t i = 0; i < width; ++i) *out++ = 0.001f * numberAt<std::uint16_t>(at + 2 * i, big_endian);
+    } else {
+      for (std::size_t i = 0; i < width; ++i) *out++ = numberAt<float>(at + 4 * i, big_endian);
+    }
   }
-  const auto metres = numberAt<float>(at, big_endian);
-  return metres > 0 ? metres : NOTHING;
 }
 
 DepthView readDepth(WireReader& wire) {
@@ -79,19 +80,19 @@ PinholeView readPinhole(WireReader& wire) {
   wire.skip(2 * sizeof(std::uint32_t), "roi");
   wire.skip(1, "roi.do_rectify");
   view.fx = p[0], view.fy = p[5], view.cx = p[2], view.cy = p[6];
-  std::ostringstream problem;
-  for (std::size_t i = 0; i < distortion.size && problem.tellp() == 0; ++i) {
-    if (distortion[i] == 0) continue;
-    problem << "D[" << i << "] is " << distortion[i]
-            << ": pictures with distortion are not rectified; take the driver's rectified depth, or its cloud";
+  for (std::size_t i = 0; i < distortion.size && view.distortion.empty(); ++i) {
+    std::ostringstream text;
+    text << "D[" << i << "] is " << distortion[i];
+    if (distortion[i] != 0) view.distortion = text.str();
   }
+  std::ostringstream problem;
   const bool is_pinhole = view.fx > 0 && view.fy > 0 && std::isfinite(view.fx * view.fy * view.cx * view.cy) &&
                           p[1] == 0 && p[3] == 0 && p[4] == 0 && p[7] == 0;
-  if (problem.tellp() == 0 && !is_pinhole) {
+  if (!is_pinhole) {
     problem << "P (" << p[0] << ' ' << p[1] << ' ' << p[2] << ' ' << p[3] << "; " << p[4] << ' ' << p[5] << ' ' << p[6]
             << ' ' << p[7] << "; ...) is no pinhole's projection";
   }
-  if (problem.tellp() == 0 && (binning_x > 1 || binning_y > 1 || left != 0 || top != 0)) {
+  if (is_pinhole && (binning_x > 1 || binning_y > 1 || left != 0 || top != 0)) {
     problem << "binning " << binning_x << " x " << binning_y << " and a region at (" << left << ", " << top
             << ") are not read; publish the CameraInfo of the picture as it is sent";
   }

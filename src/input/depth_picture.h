@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "input/mesh_views.h"
 #include "input/wire.h"
@@ -19,8 +20,8 @@ struct DepthView {
   bool in_millimetres = false;  ///< 16 bits, else floats [m]
   bool big_endian = false;
   std::size_t size() const { return height * width; }
-  /// [m] NaN: nothing is known of the pixel; infinity: nothing came back from there.
-  float depth(std::size_t i) const;
+  /// [m] Row by row, as they came: 0, or what is no number, is no measurement; infinity: nothing came back.
+  void depthsInto(std::vector<float>& depths) const;
 };
 /// Throws WireError for what is no depth, and for rows that are not there.
 DepthView readDepth(WireReader& wire);
@@ -29,7 +30,8 @@ DepthView readDepth(WireReader& wire);
 struct PinholeView {
   std::size_t height = 0, width = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
-  std::string problem;  ///< why its pictures cannot be used; empty: they can
+  std::string distortion;  ///< what a picture has that is not rectified, in words; empty: none
+  std::string problem;     ///< why its pictures cannot be used; empty: they can
 };
 /// The projection of the rectified picture. Throws WireError for what is no CameraInfo.
 PinholeView readPinhole(WireReader& wire);
