@@ -24,6 +24,8 @@ constexpr std::size_t MOST_NAMES = 6;
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
+StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
+
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
 LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config, const MapMemory& memory) {
   LoadedMap map;
@@ -32,8 +34,6 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
   if (map.stamp_ns == 0) map.stamp_ns = receiptOf(message);
   return map;
 }
-
-StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
 
 /// Clouds of a bag, of which one of each source waits while the fixed frame is not known: the newest.
 class BagClouds {

@@ -1,6 +1,7 @@
 #include "node/collision_monitor_impl.h"
 
 #include <cstdlib>
+#include <utility>
 
 #include <std_msgs/Bool.h>
 #include <tf2_msgs/TFMessage.h>
@@ -109,19 +110,18 @@ void CollisionMonitor::Impl::onTransforms(const ShapeShifter& bytes, bool is_sta
   tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 
-void CollisionMonitor::Impl::onMap(std::size_t source, const ShapeShifter::ConstPtr& message) try {
+void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {
   map_publisher_seen = true;
   const std::int64_t now_ns = steadyNs();
   const auto receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   state.mapCame(now_ns);
   const auto refuse = [&](const std::string& problem) { maps->refuse(source, problem, receipt_ns, now_ns); };
-  const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
-  if (!problem.empty()) return refuse(problem);  // before its bytes are copied
-  if (!hasMemoryFor(message->size())) {
-    return refuse("there is not enough memory for a map of " + std::to_string(message->size()) + " bytes");
-  }
-  if (needsCameraInfo(message->getDataType())) listenToCameraInfo(source);
-  maps->submit({source, message->getDataType(), bytesOf(*message), receipt_ns}, now_ns);
+  const std::size_t size = message.bytes.size();
+  const std::string problem = mapMessageProblem(message.datatype, message.md5, size, config);
+  if (!problem.empty()) return refuse(problem);
+  if (!hasMemoryFor(size)) return refuse("there is not enough memory for a map of " + std::to_string(size) + " bytes");
+  if (needsCameraInfo(message.datatype)) listenToCameraInfo(source);
+  maps->submit({source, std::move(message.datatype), std::move(message.bytes), receipt_ns}, now_ns);
 } catch (const std::exception& error) {
   tellLost(config.liveMapNames()[source], error);
 }
@@ -170,8 +170,10 @@ void CollisionMonitor::Impl::subscribe() {
   if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), steadyNs());
   for (const std::string& topic : config.liveMapNames()) {
     const std::size_t source = map_subscribers.size();
-    map_subscribers.push_back(
-        input.subscribe<ShapeShifter>(topic, 2, [this, source](const ShapeShifter::ConstPtr& m) { onMap(source, m); }));
+    ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on
+    options.initByFullCallbackType<boost::shared_ptr<RawMessage>>(
+        topic, 2, [this, source](const boost::shared_ptr<RawMessage>& message) { onMap(source, *message); });
+    map_subscribers.push_back(input.subscribe(options));
   }
 }
 

@@ -17,6 +17,7 @@
 #include <topic_tools/shape_shifter.h>
 
 #include "input/mesh_subscription.h"
+#include "input/raw_message.h"
 #include "input/steady_clock.h"
 #include "input/transforms.h"
 #include "node/collision_monitor.h"
@@ -88,7 +89,7 @@ struct CollisionMonitor::Impl {
   void subscribe();
   void onMesh(std::size_t body, MeshMessage message);
   void onTransforms(const topic_tools::ShapeShifter& bytes, bool is_static);
-  void onMap(std::size_t source, const topic_tools::ShapeShifter::ConstPtr& message);
+  void onMap(std::size_t source, RawMessage& message);
   void listenToCameraInfo(std::size_t source);
 
   // Service thread.

@@ -198,8 +198,8 @@ TEST(Sensors, PointsAtTheSensorAreNoMeasurement) {
     EXPECT_EQ(camera.clouds.counters().no_measurement, 4096u + 144);
     EXPECT_LT(map.surface->bounds().max.z(), 0.2) << "nothing is where the camera is";
   }
-  Camera far("obstacle_min_range_m: 1.2");
-  EXPECT_TRUE(says(far.whyNot(pictureOf(1, tableDepth)), "nearer to it than obstacle_min_range_m 1.2"));
+  Camera far("obstacle_min_range_m: 1.3");
+  EXPECT_TRUE(says(far.whyNot(pictureOf(1, tableDepth)), "nearer to it than obstacle_min_range_m 1.3"));
 }
 
 // Its rays went from the frame's origin, and cleared what nobody had looked through.
