@@ -167,6 +167,14 @@ struct BagReplay::Run {
     setMap(readMap(message, config, memory), static_cast<std::int64_t>(message.getTime().toNSec()));
   }
 
+  /// They are known from the start: a picture may come before its own.
+  void hearFirstCameraInfos() {
+    for (const std::string& topic : clouds.infoTopics()) {
+      rosbag::View infos(bag, rosbag::TopicQuery(topic));
+      if (infos.size() > 0) clouds.hearCameraInfo(*infos.begin());
+    }
+  }
+
   void placeCloud(const ros::Time& at) {
     for (LoadedMap& map : clouds.take(pipeline.fixedFrame())) {
       setMap(std::move(map), static_cast<std::int64_t>(at.toNSec()));
@@ -351,11 +359,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     run.setMap(readMap(*at_first, config_, run.memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
     first_is_taken = true;
   }
-  // The first ones are known from the start: a picture may come before its own.
-  for (const std::string& topic : run.clouds.infoTopics()) {
-    rosbag::View infos(run.bag, rosbag::TopicQuery(topic));
-    if (infos.size() > 0) run.clouds.hearCameraInfo(*infos.begin());
-  }
+  run.hearFirstCameraInfos();
 
   TransformWindow transforms(run.bag, run.feed);
   ProgressBar progress(path_, all.size(), options_.show_progress);
