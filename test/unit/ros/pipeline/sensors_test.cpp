@@ -173,6 +173,21 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
   EXPECT_TRUE(says(without.add(good).problem, "no CameraInfo has come on /camera/camera_info; name its topic"));
 }
 
+TEST(Sensors, OfACutMessageNothingIsTaken) {
+  const std::vector<std::uint8_t> picture = bytesOf(pictureOf(1, tableDepth)), info = bytesOf(infoOf());
+  for (std::size_t size = 0; size < picture.size(); size += size < 80 ? 1 : 509) {
+    Camera camera;
+    CloudMessage cut = messageOf(sensor_msgs::Image(), 0, 1);
+    cut.bytes.assign(picture.begin(), picture.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_NE(camera.clouds.add(cut, [] { return false; }).problem, "") << size;
+  }
+  for (std::size_t size = 0; size < info.size(); size += 7) {
+    Camera camera;
+    camera.clouds.setCameraInfo(0, "", {info.begin(), info.begin() + static_cast<std::ptrdiff_t>(size)});
+    EXPECT_TRUE(says(camera.whyNot(pictureOf(1, tableDepth)), "the CameraInfo on /camera/camera_info: ")) << size;
+  }
+}
+
 TEST(Sensors, TheCameraInfoIsBesideThePicturesOrWhereItIsNamed) {
   const CloudSource source{"/a/depth/image_rect_raw", "", ""}, named{"/a/depth/image", "/b/info", ""};
   EXPECT_EQ(cameraInfoTopic(source), "/a/depth/camera_info");
