@@ -44,7 +44,11 @@ MonitorConfig configure(const Arguments& a) {
     }
     tree.put("topic", a.mesh);
   } else if (!tree.has("bodies") && !tree.has("topic")) {
-    const std::string clouds = tree.has("obstacle_cloud_topic") ? tree.members["obstacle_cloud_topic"].text : "";
+    ParameterTree copy = tree;
+    std::vector<std::string> clouds{copy.members["obstacle_cloud_topic"].text};
+    for (ParameterTree& one : copy.members["obstacle_cloud_topics"].items) {
+      clouds.push_back(one.kind == ParameterTree::Kind::TEXT ? one.text : one.members["topic"].text);
+    }
     const std::string topic = BagReplay::firstMeshTopic(a.bag, clouds);
     if (!topic.empty()) tree.put("topic", topic);
   }

@@ -1,10 +1,15 @@
 // The parameters of the map: where it comes from, what it may cost, and what of it is a body's own or not known.
+#include <set>
 #include <sstream>
 
 #include "config/body_config.h"
+#include "input/short_text.h"
 
 namespace dccd {
 namespace {
+
+// Each has a place to wait, and all that wait share an eighth of max_map_mb.
+constexpr std::size_t MOST_CLOUD_TOPICS = 16;
 
 void readSensorModel(ParameterReader section, CloudMapOptions& map) {
   map.hit = section.number("hit", map.hit, 0.5, 0.9999);
@@ -14,13 +19,58 @@ void readSensorModel(ParameterReader section, CloudMapOptions& map) {
   section.finish();
 }
 
+CloudSource readCloudSource(ParameterReader entry) {
+  CloudSource source;
+  source.topic = entry.text("topic");
+  source.camera_info = entry.text("camera_info", std::string());
+  source.sensor_frame = entry.frame("sensor_frame");
+  entry.finish();
+  return source;
+}
+
+/// Of each sensor the topic alone, or with what else there is to say of it.
+void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
+  const char* const name = "obstacle_cloud_topics";
+  if (!reader.has(name)) return;
+  for (const char* single : {"obstacle_cloud_topic", "obstacle_camera_info_topic", "obstacle_sensor_frame"}) {
+    if (reader.has(single)) {
+      reader.fail(single, std::string("has no place beside ") + name +
+                              "; write {topic: …, camera_info: …, sensor_frame: …} there, and remove it");
+    }
+  }
+  config.clouds.clear();
+  std::set<std::string> topics;
+  for (const ParameterTree& item : reader.list("obstacle_cloud_topics")) {
+    const std::string path = reader.path() + name + "/" + std::to_string(config.clouds.size()) + "/";
+    ParameterTree entry = item;
+    if (item.kind == ParameterTree::Kind::TEXT) {
+      entry = ParameterTree();
+      entry.put("topic", item);
+    }
+    config.clouds.push_back(readCloudSource(ParameterReader(entry, path)));
+    const std::string& topic = config.clouds.back().topic;
+    if (!topics.insert(topic).second) reader.fail(name, "has '" + topic + "' twice; remove one of the two");
+  }
+  if (config.clouds.empty()) reader.fail(name, "is empty; remove it, or name the clouds' topics");
+  if (config.clouds.size() > MOST_CLOUD_TOPICS) {
+    reader.fail(name, "has " + std::to_string(config.clouds.size()) + " entries, more than " +
+                          std::to_string(MOST_CLOUD_TOPICS));
+  }
+}
+
 void readClouds(ParameterReader& reader, MonitorConfig& config) {
   // What is said of clouds is said by somebody who has them.
-  for (const char* name : {"obstacle_cloud_topic", "obstacle_resolution_m", "obstacle_max_range_m", "sensor_model"}) {
+  for (const char* name : {"obstacle_cloud_topic", "obstacle_cloud_topics", "obstacle_camera_info_topic",
+                           "obstacle_sensor_frame", "obstacle_resolution_m", "obstacle_min_range_m",
+                           "obstacle_max_range_m", "obstacle_no_return", "obstacle_box", "sensor_model"}) {
     config.cloud_named = config.cloud_named || reader.has(name);
   }
-  config.cloud_topic = reader.get("obstacle_cloud_topic", config.cloud_topic);
-  if (config.cloud_topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
+  CloudSource& single = config.clouds.front();
+  single.topic = reader.get("obstacle_cloud_topic", single.topic);
+  if (single.topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
+  single.camera_info = reader.get("obstacle_camera_info_topic", std::string());
+  single.sensor_frame = reader.frame("obstacle_sensor_frame");
+  readCloudTopics(reader, config);
   CloudMapOptions& map = config.cloud_map;
   map.resolution_m = reader.number("obstacle_resolution_m", map.resolution_m, 1e-4, 1e3);
   map.max_range_m = reader.number("obstacle_max_range_m", map.max_range_m, 0, LARGE);
@@ -30,6 +80,20 @@ void readClouds(ParameterReader& reader, MonitorConfig& config) {
          << CloudMap::MOST_RAY_VOXELS << " voxels at most; write at least "
          << map.max_range_m / CloudMap::MOST_RAY_VOXELS << ", or a shorter range";
     reader.fail("obstacle_resolution_m", text.str());
+  }
+  map.min_range_m = reader.number("obstacle_min_range_m", DEFAULT_MIN_RANGE_M, 0, LARGE);
+  if (map.max_range_m > 0 && map.min_range_m >= map.max_range_m) {
+    std::ostringstream text;
+    text << "is " << map.min_range_m << ", which leaves nothing of obstacle_max_range_m " << map.max_range_m;
+    reader.fail("obstacle_min_range_m", text.str());
+  }
+  map.no_return_clears = reader.choice("obstacle_no_return", "stays", {"stays", "clears"}) == "clears";
+  if (const ParameterTree& box = reader.raw("obstacle_box"); box.isSet()) {
+    const auto n = reader.numbers(box, "obstacle_box", 6);
+    map.box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (map.box->empty()) {
+      reader.fail("obstacle_box", "is empty; [x0, y0, z0, x1, y1, z1] in the map's frame, the smaller corner first");
+    }
   }
   readSensorModel(reader.section("sensor_model"), map);
 }
@@ -72,13 +136,18 @@ void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) 
               "is unknown; write unknown_space: free, or own_voxels_m: 0");
 }
 
-const std::string& MonitorConfig::liveMapName() const { return cloud_named ? cloud_topic : octomap_topic; }
+std::vector<std::string> MonitorConfig::liveMapNames() const {
+  if (!cloud_named) return {octomap_topic};
+  std::vector<std::string> names;
+  for (const CloudSource& source : clouds) names.push_back(source.topic);
+  return names;
+}
 
-const std::string& MonitorConfig::mapName() const { return takesMapFileAlone() ? octomap_file : liveMapName(); }
+std::string MonitorConfig::mapName() const { return takesMapFileAlone() ? octomap_file : listOf(liveMapNames()); }
 
 void MonitorConfig::checkMapNames() const {
   if (!cloud_named || !octomap_topic_named) return;
-  throw ParameterError("the map is to come both from the clouds on obstacle_cloud_topic '" + cloud_topic +
+  throw ParameterError("the map is to come both from the clouds on obstacle_cloud_topic '" + clouds.front().topic +
                        "' and from octomap_topic '" + octomap_topic + "'; remove one of the two");
 }
 

@@ -45,6 +45,14 @@ struct BodyConfig {
   bool isUncertain() const { return hasNoise() || max_acceleration_m_s2 > 0; }
 };
 
+/// A topic of clouds, or of depth pictures, that become part of the map. More than one view may be on it: a sensor is
+/// told by the topic and the frame_id of its messages.
+struct CloudSource {
+  std::string topic;
+  std::string camera_info;   ///< topic of a depth picture's CameraInfo; empty: camera_info beside the picture's
+  std::string sensor_frame;  ///< where the sensor is whose clouds come in the map's own frame; empty: nobody says
+};
+
 struct MarkerConfig {
   double point_size_m = 0.01;
   double normal_length_m = 0.05;
@@ -62,6 +70,9 @@ constexpr std::size_t NO_MAP_LIMIT = std::size_t{1} << 50;
 constexpr const char* DEFAULT_OCTOMAP_TOPIC = "octomap_binary";
 /// Where a sensor's clouds are looked for that somebody named without a topic.
 constexpr const char* DEFAULT_CLOUD_TOPIC = "obstacle_cloud";
+
+/// What depth cameras send for "nothing" lies at the sensor.
+constexpr double DEFAULT_MIN_RANGE_M = 0.01;
 
 struct MonitorConfig {
   std::string fixed_frame;         ///< empty: the frame of the clock body's first message
@@ -88,9 +99,9 @@ struct MonitorConfig {
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
-  bool octomap_topic_named = false;               ///< as BodyConfig::topic_named
-  std::string cloud_topic = DEFAULT_CLOUD_TOPIC;  ///< of clouds that are made a map
-  bool cloud_named = false;                       ///< they are called for: by any parameter of theirs
+  bool octomap_topic_named = false;                                ///< as BodyConfig::topic_named
+  std::vector<CloudSource> clouds{{DEFAULT_CLOUD_TOPIC, {}, {}}};  ///< that are made a map; one or more
+  bool cloud_named = false;                                        ///< they are called for: by any parameter of theirs
   CloudMapOptions cloud_map;
   std::size_t max_map_bytes = std::size_t{512} << 20;     ///< see limitLive(); NO_MAP_LIMIT: none
   std::size_t max_memory_bytes = std::size_t{512} << 20;  ///< see limitLive()
@@ -117,9 +128,9 @@ struct MonitorConfig {
   bool takesClouds() const { return cloud_named; }
   /// octomap_file in the place of a live map, not beside it.
   bool takesMapFileAlone() const { return !octomap_file.empty() && !octomap_topic_named && !cloud_named; }
-  /// Its file, or the topic of its messages or of its clouds, as the parameters have it.
-  const std::string& mapName() const;
-  const std::string& liveMapName() const;  ///< a topic
+  /// Its file, or the topics of its messages or of its clouds, as the parameters have it.
+  std::string mapName() const;
+  std::vector<std::string> liveMapNames() const;  ///< topics
   /// Throws ParameterError where both a map and clouds are named: there is one map.
   void checkMapNames() const;
   /// The map is called for: a step without one lacks it. Else it is used when it is there.

@@ -20,7 +20,7 @@ constexpr std::size_t MAX_PIXELS = std::size_t{1} << 26;  // PCL counts twice as
 std::size_t keptOf(std::size_t pixels, std::size_t stride) { return (pixels + stride - 1) / stride; }
 
 /// A grid of filters would lose the rows and columns that make neighbours; this keeps them.
-Cloud::Ptr thinned(const CloudView& cloud, const DepthSurfaceOptions& options) {
+Cloud::Ptr thinned(const CloudView& cloud, const DepthSurfaceOptions& options, std::size_t& no_measurement) {
   constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
   constexpr double FAR_M = 1e9;
   Cloud::Ptr out(new Cloud(static_cast<std::uint32_t>(keptOf(cloud.width, options.stride)),
@@ -32,6 +32,10 @@ Cloud::Ptr thinned(const CloudView& cloud, const DepthSurfaceOptions& options) {
       const Vec3 p = cloud.point(row * cloud.width + col);
       // PCL works in float; what is past that is no point of a camera, either.
       if (!(p.cwiseAbs().maxCoeff() <= FAR_M) || (options.max_range_m > 0 && p.z() > options.max_range_m)) continue;
+      if (!(p.norm() > options.min_range_m)) {
+        ++no_measurement;
+        continue;
+      }
       (*out)[kept] = pcl::PointXYZ(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
     }
   }
@@ -69,8 +73,8 @@ DepthSurface depthSurface(const CloudView& cloud, const DepthSurfaceOptions& opt
   if (keptPixels(cloud, options.stride) > MAX_PIXELS) {
     throw DepthSurfaceError("more than " + std::to_string(MAX_PIXELS) + " pixels are kept; raise topology/stride");
   }
-  const Cloud::Ptr seen = smoothed(thinned(cloud, options), options.median);
   DepthSurface surface;
+  const Cloud::Ptr seen = smoothed(thinned(cloud, options, surface.no_measurement), options.median);
   constexpr Index UNUSED = std::numeric_limits<Index>::max();
   std::vector<Index> vertex(seen->size(), UNUSED);
   const auto vertexOf = [&](std::size_t kept) {
@@ -93,7 +97,8 @@ DepthSurface depthSurface(const CloudView& cloud, const DepthSurfaceOptions& opt
   }
   if (surface.faces.empty()) {
     throw DepthSurfaceError("no three of the " + std::to_string(seen->size()) +
-                            " kept pixels are neighbours within topology/max_edge_m and topology/max_range_m");
+                            " kept pixels are neighbours within topology/max_edge_m, topology/min_range_m and "
+                            "topology/max_range_m");
   }
   return surface;
 }

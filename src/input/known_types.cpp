@@ -2,6 +2,8 @@
 
 #include <deformable_ccd/ContactArray.h>
 #include <octomap_msgs/Octomap.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
 #include <sensor_msgs/PointCloud2.h>
 
 #include "input/message_type.h"
@@ -24,7 +26,16 @@ std::string mapTypeProblem(const std::string& datatype, const std::string& md5) 
 }
 
 std::string cloudTypeProblem(const std::string& datatype, const std::string& md5) {
+  if (isDepthPicture(datatype)) return typeProblem<sensor_msgs::Image>(datatype, md5, "a depth picture");
   return typeProblem<sensor_msgs::PointCloud2>(datatype, md5, "a cloud");
+}
+
+std::string cameraInfoProblem(const std::string& datatype, const std::string& md5) {
+  return typeProblem<sensor_msgs::CameraInfo>(datatype, md5, "a CameraInfo");
+}
+
+bool isDepthPicture(const std::string& datatype) {
+  return datatype == ros::message_traits::datatype<sensor_msgs::Image>();
 }
 
 bool isMonitorsMarkers(const std::string& topic, const std::map<std::string, std::string>& types) {

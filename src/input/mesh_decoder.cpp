@@ -11,6 +11,9 @@ namespace dccd {
 
 namespace {
 
+// A tracker has fewer points than a quarter of the smallest depth camera has pixels.
+constexpr std::size_t LEAST_PICTURE = 160 * 120;
+
 [[noreturn]] void refuse(const std::string& text) { throw MeshError(StepStatus::BAD_MESSAGE, text); }
 
 void requireSomething(const PolygonFaces& faces) {
@@ -237,6 +240,7 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   }
   mesh.topology = std::make_shared<const Topology>(Topology::fromTriangles(surface.positions.size(), surface.faces));
   mesh.positions = std::move(surface.positions);
+  mesh.no_measurement = surface.no_measurement;
   addRadii(&cloud, mesh, &surface.pixel);
   return mesh;
 }
@@ -267,6 +271,11 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
         "topology/source to polyline or file");
   }
   if (!is_rope) takeFixed(cloud.size(), cloud.height, cloud.width, mesh);
+  if (!is_rope && !hasFixedTopology() && cloud.size() >= LEAST_PICTURE) {
+    mesh.camera_remark = "a cloud of " + std::to_string(cloud.width) + " x " + std::to_string(cloud.height) +
+                         " points is taken for a grid, whose points are the same ones in each frame; if it is a depth "
+                         "camera's, name it as obstacle_cloud, or set topology/source: depth_image and motion: static";
+  }
   mesh.positions.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
   // Of a cloud of several rows and columns, each row is a rope.

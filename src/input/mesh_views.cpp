@@ -50,6 +50,10 @@ void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8
     if (cloud.extra) throw WireError("there are two fields '" + extra_field_ + "'");
     cloud.extra = fieldOf(name, offset, datatype);
   }
+  const bool is_real = datatype == FLOAT32 || datatype == FLOAT64;
+  if (is_real && name.size() == 4 && name.substr(0, 3) == "vp_" && name[3] >= 'x' && name[3] <= 'z') {
+    viewpoint_[static_cast<std::size_t>(name[3] - 'x')] = fieldOf(name, offset, datatype);
+  }
   if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') return;
   const auto axis = static_cast<std::size_t>(name[0] - 'x');
   if (found_[axis]) throw WireError("there are two fields '" + std::string(name) + "'");
@@ -57,7 +61,7 @@ void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8
   found_[axis] = true;
 }
 
-void CloudFieldFinder::finish(const CloudView& cloud) const {
+void CloudFieldFinder::finish(CloudView& cloud) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!found_[axis])
       throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'" + there());
@@ -65,13 +69,17 @@ void CloudFieldFinder::finish(const CloudView& cloud) const {
   if (!extra_field_.empty() && !cloud.extra) {
     throw WireError("there is no field '" + extra_field_ + "', which parameter uncertainty/field names" + there());
   }
+  const auto& [x, y, z] = viewpoint_;
+  if (x && y && z) cloud.viewpoint = {*x, *y, *z};
 }
 
 std::string CloudFieldFinder::there() const { return names_.empty() ? "; there are none" : "; there are: " + names_; }
 
 void checkStrides(CloudView& cloud, std::size_t bytes) {
-  for (const CloudView::Coordinate& coordinate :
-       {cloud.xyz[0], cloud.xyz[1], cloud.xyz[2], cloud.extra.value_or(cloud.xyz[0])}) {
+  std::vector<CloudView::Coordinate> all(cloud.xyz.begin(), cloud.xyz.end());
+  if (cloud.extra) all.push_back(*cloud.extra);
+  if (cloud.viewpoint) all.insert(all.end(), cloud.viewpoint->begin(), cloud.viewpoint->end());
+  for (const CloudView::Coordinate& coordinate : all) {
     if (coordinate.offset + sizeOf(coordinate) > cloud.point_step) {
       throw WireError("a coordinate's offset " + std::to_string(coordinate.offset) + " reaches past point_step " +
                       std::to_string(cloud.point_step));
@@ -106,8 +114,6 @@ double CloudView::value(std::size_t i, const Coordinate& field) const {
   const std::uint8_t* at = data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step + field.offset;
   return field.is_double ? numberAt<double>(at, big_endian) : numberAt<float>(at, big_endian);
 }
-
-Vec3 CloudView::point(std::size_t i) const { return {value(i, xyz[0]), value(i, xyz[1]), value(i, xyz[2])}; }
 
 CloudView readCloud(WireReader& wire, const std::string& extra_field) {
   CloudView cloud;

@@ -37,8 +37,13 @@ struct CloudView {
   };
   std::array<Coordinate, 3> xyz;
   std::optional<Coordinate> extra;  ///< the further field that was asked for
+  /// vp_x, vp_y, vp_z, where there are all three: where the point was seen from.
+  std::optional<std::array<Coordinate, 3>> viewpoint;
   std::size_t size() const { return height * width; }
-  Vec3 point(std::size_t i) const;
+  Vec3 point(std::size_t i) const { return vector(i, xyz); }
+  Vec3 vector(std::size_t i, const std::array<Coordinate, 3>& fields) const {
+    return {value(i, fields[0]), value(i, fields[1]), value(i, fields[2])};
+  }
   /// Value of the further field; only where there is one.
   double extraValue(std::size_t i) const { return value(i, *extra); }
   double value(std::size_t i, const Coordinate& field) const;
@@ -53,11 +58,12 @@ class CloudFieldFinder {
   explicit CloudFieldFinder(const std::string& extra_field) : extra_field_(extra_field) {}
   void add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud);
   /// Throws WireError naming the field that is not there, and those that are.
-  void finish(const CloudView& cloud) const;
+  void finish(CloudView& cloud) const;
 
  private:
   const std::string& extra_field_;
   std::array<bool, 3> found_{};
+  std::array<std::optional<CloudView::Coordinate>, 3> viewpoint_;
   std::string names_;  // of the fields, as far as they are told
 
   std::string there() const;

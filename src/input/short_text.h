@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dccd {
 
@@ -16,6 +17,13 @@ inline std::string shortText(std::string_view text, std::size_t limit = MAX_TEXT
   }
   if (text.size() > limit) kept += "… (" + std::to_string(text.size() - limit) + " more)";
   return kept;
+}
+
+/// "a, b, c".
+inline std::string listOf(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
 }
 
 /// Empty when tf2 takes it as a frame's name; else what is wrong with it, in a few words. tf2 itself writes a line to

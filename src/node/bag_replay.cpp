@@ -10,6 +10,7 @@
 #include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "input/message_type.h"
+#include "input/short_text.h"
 #include "input/transforms.h"
 #include "node/bag_reading.h"
 #include "octomap/coarser.h"
@@ -23,43 +24,66 @@ constexpr std::size_t MOST_NAMES = 6;
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
+StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
+
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
 LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config, const MapMemory& memory) {
   LoadedMap map;
   map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
   if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory);
-  if (map.stamp_ns == 0) map.stamp_ns = static_cast<StampNs>(message.getTime().toNSec());
+  if (map.stamp_ns == 0) map.stamp_ns = receiptOf(message);
   return map;
 }
 
-/// Clouds of a bag, of which one waits while the fixed frame is not known: the newest.
+/// Clouds of a bag, of which one of each source waits while the fixed frame is not known: the newest.
 class BagClouds {
  public:
   BagClouds(const MonitorConfig& config, const TransformFeed& feed, const MapMemory& memory)
-      : clouds_(config, feed, memory) {}
+      : clouds_(config, feed, memory), held_(config.clouds.size()) {
+    for (std::size_t source = 0; source < config.clouds.size(); ++source) {
+      const std::string& topic = config.clouds[source].topic;
+      by_topic_[topic] = source;
+      by_info_topic_[absolute(cameraInfoTopic(config.clouds[source]))].push_back(source);
+    }
+  }
 
+  std::size_t sourceOf(const std::string& topic) const { return by_topic_.at(topic); }
+  std::vector<std::string> infoTopics() const {
+    std::vector<std::string> topics;
+    for (const auto& one : by_info_topic_) topics.push_back(one.first);
+    return topics;
+  }
+  void hearCameraInfo(const rosbag::MessageInstance& message) {
+    const auto sources = by_info_topic_.find(message.getTopic());
+    if (sources == by_info_topic_.end()) return;
+    const std::string problem = cameraInfoProblem(message.getDataType(), message.getMD5Sum());
+    for (const std::size_t source : sources->second) clouds_.setCameraInfo(source, problem, bytesOf(message));
+  }
   void hold(const rosbag::MessageInstance& message) {
-    bytes_ = bytesOf(message);
-    receipt_ns_ = static_cast<StampNs>(message.getTime().toNSec());
+    const std::size_t source = sourceOf(message.getTopic());
+    held_[source] = CloudMessage{source, message.getDataType(), bytesOf(message), receiptOf(message)};
   }
-  /// What the map is with the cloud that is held, once.
-  std::optional<LoadedMap> take(const std::string& fixed_frame) {
+  void refuse(const rosbag::MessageInstance& message, const std::string& problem) {
+    clouds_.refuse(sourceOf(message.getTopic()), receiptOf(message), problem);
+  }
+  /// What the map is with each cloud that is held, once.
+  std::vector<LoadedMap> take(const std::string& fixed_frame) {
     clouds_.setFrame(fixed_frame);
-    if (!bytes_ || !clouds_.hasFrame()) return std::nullopt;
-    return clouds_.add(*std::exchange(bytes_, std::nullopt), receipt_ns_, [] { return false; });
+    std::vector<LoadedMap> maps;
+    for (std::optional<CloudMessage>& one : held_) {
+      if (!one || !clouds_.hasFrame()) continue;
+      maps.push_back(clouds_.add(*std::exchange(one, std::nullopt), [] { return false; }));
+    }
+    return maps;
   }
+  CloudCounters counters() const { return clouds_.counters(); }
 
  private:
   CloudMapping clouds_;
-  std::optional<std::vector<std::uint8_t>> bytes_;
-  StampNs receipt_ns_ = 0;
+  std::map<std::string, std::size_t> by_topic_;
+  std::map<std::string, std::vector<std::size_t>> by_info_topic_;
+  std::vector<std::optional<CloudMessage>> held_;
 };
-
-std::string listOf(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
-}
 
 }  // namespace
 
@@ -124,6 +148,7 @@ struct BagReplay::Run {
   void setMap(LoadedMap map, std::int64_t now_ns) {
     ++summary.maps;
     map.arrival_ns = now_ns;
+    summary.points_no_measurement = clouds.counters().no_measurement;
     if (map.surface && variation.voxels > 1) map.surface = coarser(*map.surface, variation.voxels);
     if (!map.surface) {
       ++summary.maps_refused;
@@ -135,16 +160,26 @@ struct BagReplay::Run {
 
   void mapMessage(const rosbag::MessageInstance& message) {
     const MonitorConfig& config = pipeline.config();
-    if (config.takesClouds() &&
-        mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config).empty()) {
-      return clouds.hold(message);
+    if (config.takesClouds()) {
+      const std::string problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
+      if (problem.empty()) return clouds.hold(message);
+      clouds.refuse(message, problem);
     }
     setMap(readMap(message, config, memory), static_cast<std::int64_t>(message.getTime().toNSec()));
   }
 
+  /// They are known from the start: a picture may come before its own.
+  void hearFirstCameraInfos() {
+    for (const std::string& topic : clouds.infoTopics()) {
+      rosbag::View infos(bag, rosbag::TopicQuery(topic));
+      if (infos.size() > 0) clouds.hearCameraInfo(*infos.begin());
+    }
+  }
+
   void placeCloud(const ros::Time& at) {
-    std::optional<LoadedMap> map = clouds.take(pipeline.fixedFrame());
-    if (map) setMap(std::move(*map), static_cast<std::int64_t>(at.toNSec()));
+    for (LoadedMap& map : clouds.take(pipeline.fixedFrame())) {
+      setMap(std::move(map), static_cast<std::int64_t>(at.toNSec()));
+    }
   }
 
   void drain(const ros::Time& at) {
@@ -228,7 +263,7 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
 }
 
 void BagReplay::chooseMapTopic() {
-  config_.cloud_topic = absolute(config_.cloud_topic);
+  for (CloudSource& source : config_.clouds) source.topic = absolute(source.topic);
   config_.octomap_topic = absolute(config_.octomap_topic);
   const bool there = std::find(map_topics_.begin(), map_topics_.end(), config_.octomap_topic) != map_topics_.end();
   if (!config_.octomap_topic_named && !there && !map_topics_.empty()) config_.octomap_topic = map_topics_.front();
@@ -255,8 +290,8 @@ std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
   if (summary.maps > summary.maps_refused) return "";
   const bool is_file = config_.takesMapFileAlone();
   if (config_.takesClouds()) {
-    return summary.maps > 0 ? "no cloud on " + config_.cloud_topic + " could be used"
-                            : "the bag has no cloud on " + config_.cloud_topic + ", which is to make the map";
+    return summary.maps > 0 ? "no cloud on " + config_.mapName() + " could be used"
+                            : "the bag has no cloud on " + config_.mapName() + ", which is to make the map";
   }
   if (summary.maps > 0) {
     return (is_file ? "the octomap of " + config_.octomap_file : "no octomap on " + config_.octomap_topic) +
@@ -279,7 +314,7 @@ std::string BagReplay::unusedMap(const BagReplaySummary& summary, bool may_use_m
 /// Topics that could be bodies and are none.
 std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
   std::set<std::string> heard(summary.mesh_topics.begin(), summary.mesh_topics.end());
-  heard.insert(config_.liveMapName());
+  for (const std::string& topic : config_.liveMapNames()) heard.insert(topic);
   std::vector<std::string> unheard;
   for (const auto& [topic, type] : topics_) {
     if (heard.count(topic) == 0 && findMeshType(type) && !isMonitorsMarkers(topic, topics_)) unheard.push_back(topic);
@@ -291,14 +326,15 @@ std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
          (more > 0 ? " and " + std::to_string(more) + " more" : "");
 }
 
-std::string BagReplay::firstMeshTopic(const std::string& bag, const std::string& clouds) {
+std::string BagReplay::firstMeshTopic(const std::string& bag, const std::vector<std::string>& clouds) {
   rosbag::Bag file;
   openBag(bag, file);
   rosbag::View view(file);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
-    if (c->topic == absolute(clouds) || isMonitorsMarkers(c->topic, types)) continue;
+    const auto isTopic = [&](const std::string& cloud) { return absolute(cloud) == c->topic; };
+    if (std::any_of(clouds.begin(), clouds.end(), isTopic) || isMonitorsMarkers(c->topic, types)) continue;
     if (meshTypeProblem(c->datatype, c->md5sum, c->msg_def).empty()) return c->topic;
   }
   return "";
@@ -332,7 +368,7 @@ void BagReplay::tellMissing(Run& run) const {
 
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
   Run run(*this, sink, predictions);
-  const std::string& map_topic = config_.liveMapName();
+  const std::vector<std::string> map_topics = config_.liveMapNames();
   const bool may_use_map = run.pipeline.effects().mayUseMap();
   const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
@@ -344,13 +380,14 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     run.setMap(loadMapFile(config_.octomap_file, config_, &run.memory), 0);
   }
 
-  rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
+  rosbag::View maps(run.bag, rosbag::TopicQuery(map_topics));
   bool first_is_taken = false;
   if (bag_maps && !config_.takesClouds() && maps.size() > 0) {
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
     run.setMap(readMap(*at_first, config_, run.memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
     first_is_taken = true;
   }
+  run.hearFirstCameraInfos();
 
   TransformWindow transforms(run.bag, run.feed);
   ProgressBar progress(path_, all.size(), options_.show_progress);
@@ -369,7 +406,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     transforms.feedUntil(at);
     for (const std::string& line : run.feed.takeComplaints()) run.complain("tf: " + line);
     if (is_mesh) run.meshes(bodies->second, m, bytes);
-    const bool is_map = bag_maps && m.getTopic() == map_topic;
+    run.clouds.hearCameraInfo(m);
+    const bool is_map = bag_maps && std::count(map_topics.begin(), map_topics.end(), m.getTopic()) > 0;
     if (is_map && !std::exchange(first_is_taken, false)) run.mapMessage(m);
     run.placeCloud(at);
     progress.advance();

@@ -33,7 +33,7 @@ struct BagReplayOptions {
 /// What a replay met besides outcomes.
 struct BagReplaySummary {
   std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
-  std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0;
+  std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0, points_no_measurement = 0;
   std::string fixed_frame;              ///< at the end
   std::string map_source;               ///< its topic or file, and who named it, in words
   std::vector<std::string> complaints;  ///< refused messages, each kind once; maps that are missing or not listened to
@@ -62,9 +62,9 @@ class BagReplay {
   /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.
   BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
 
-  /// The first topic of the bag that carries meshes, is no monitor's own and not that of `clouds`, for configurations
+  /// The first topic of the bag that carries meshes, is no monitor's own and none of `clouds`, for configurations
   /// that name none. Empty: none.
-  static std::string firstMeshTopic(const std::string& bag, const std::string& clouds);
+  static std::string firstMeshTopic(const std::string& bag, const std::vector<std::string>& clouds);
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that

@@ -1,11 +1,13 @@
 #include "node/collision_monitor_impl.h"
 
 #include <cstdlib>
+#include <utility>
 
 #include <std_msgs/Bool.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "dccd/simd_target.h"
+#include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "node/robot_source.h"
 
@@ -110,19 +112,37 @@ void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShi
   tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 
-void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) try {
+void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {
   map_publisher_seen = true;
   const std::int64_t now_ns = steadyNs();
+  const auto receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   state.mapCame(now_ns);
-  const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
-  if (!problem.empty()) return maps->refuse(problem, now_ns);  // before its bytes are copied
-  if (!hasMemoryFor(message->size())) {
-    return maps->refuse("there is not enough memory for a map of " + std::to_string(message->size()) + " bytes",
-                        now_ns);
-  }
-  maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns);
+  const auto refuse = [&](const std::string& problem) { maps->refuse(source, problem, receipt_ns, now_ns); };
+  const std::size_t size = message.bytes.size();
+  const std::string problem = mapMessageProblem(message.datatype, message.md5, size, config);
+  if (!problem.empty()) return refuse(problem);
+  if (!hasMemoryFor(size)) return refuse("there is not enough memory for a map of " + std::to_string(size) + " bytes");
+  if (needsCameraInfo(message.datatype)) listenToCameraInfo(source);
+  maps->submit({source, std::move(message.datatype), std::move(message.bytes), receipt_ns}, now_ns);
 } catch (const std::exception& error) {
-  tellLost(config.liveMapName(), error);
+  tellLost(config.liveMapNames()[source], error);
+}
+
+/// From the first picture on: clouds need none.
+void CollisionMonitor::Impl::listenToCameraInfo(std::size_t source) {
+  if (camera_info_subscribers.count(source) > 0) return;
+  const std::string topic = cameraInfoTopic(config.clouds[source]);
+  ros::NodeHandle input(node);
+  input.setCallbackQueue(&input_callbacks);
+  camera_info_subscribers[source] = input.subscribe<ShapeShifter>(
+      topic, SUBSCRIBER_QUEUE, [this, source, topic](const ShapeShifter::ConstPtr& message) {
+        try {
+          maps->setCameraInfo(source, cameraInfoProblem(message->getDataType(), message->getMD5Sum()),
+                              bytesOf(*message));
+        } catch (const std::exception& error) {
+          tellLost(topic, error);
+        }
+      });
 }
 
 void CollisionMonitor::Impl::subscribe() {
@@ -151,8 +171,13 @@ void CollisionMonitor::Impl::subscribe() {
   maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });
   if (config.takesMapFileAlone()) return maps->submitFile(config.octomap_file, steadyNs());
   if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), steadyNs());
-  map_subscriber =
-      input.subscribe<ShapeShifter>(config.liveMapName(), 2, [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
+  for (const std::string& topic : config.liveMapNames()) {
+    const std::size_t source = map_subscribers.size();
+    ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on
+    options.initByFullCallbackType<boost::shared_ptr<RawMessage>>(
+        topic, 2, [this, source](const boost::shared_ptr<RawMessage>& message) { onMap(source, *message); });
+    map_subscribers.push_back(input.subscribe(options));
+  }
 }
 
 // --- start and stop --------------------------------------------------------------------------------------------------
@@ -166,7 +191,7 @@ void CollisionMonitor::Impl::start() {
   advertiseObjects(service);
   listenToChanges(service);
   master = std::make_unique<MasterWatch>(
-      mesh_subscriptions, map_subscriber, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
+      mesh_subscriptions, map_subscribers, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
   master->watchParameters(config.robot.parameters, [this](const std::vector<std::string>& changed) {
     queue.command([this, changed] {
       for (const std::string& sentence : pipeline.robotChanged(changed))

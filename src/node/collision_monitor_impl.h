@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <map>
 #include <thread>
 
 #include <ros/callback_queue.h>
@@ -16,6 +17,7 @@
 #include <topic_tools/shape_shifter.h>
 
 #include "input/mesh_subscription.h"
+#include "input/raw_message.h"
 #include "input/steady_clock.h"
 #include "input/transforms.h"
 #include "node/collision_monitor.h"
@@ -52,7 +54,9 @@ struct CollisionMonitor::Impl {
   ros::CallbackQueue input_callbacks, service_callbacks;
   ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
   std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
-  ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
+  std::vector<ros::Subscriber> map_subscribers;                    // of the octomap, or one for each source of clouds
+  std::map<std::size_t, ros::Subscriber> camera_info_subscribers;  // of depth pictures, by their source
+  ros::Subscriber tf_subscriber, tf_static_subscriber;
   std::unique_ptr<MasterWatch> master;
   std::vector<ros::ServiceServer> services;
   std::unique_ptr<Reconfigure> reconfigure;
@@ -84,7 +88,8 @@ struct CollisionMonitor::Impl {
   void subscribe();
   void onMesh(std::size_t body, MeshMessage message);
   void onTransforms(const ros::MessageEvent<const topic_tools::ShapeShifter>& event, bool is_static);
-  void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
+  void onMap(std::size_t source, RawMessage& message);
+  void listenToCameraInfo(std::size_t source);
 
   // Service thread.
   void advertiseServices(ros::NodeHandle& service);

@@ -93,7 +93,9 @@ std::string mapMessageProblem(const std::string& datatype, const std::string& md
 }
 
 std::string whyRefused(const std::string& problem, const MonitorConfig& config) {
-  if (problem.rfind("no transform", 0) == 0) return problem;
+  for (const char* told : {"no transform", "no cloud ", "the newest cloud "}) {
+    if (problem.rfind(told, 0) == 0) return problem;
+  }
   return (config.takesClouds() ? "the cloud was refused: " : "the octomap was refused: ") + problem;
 }
 

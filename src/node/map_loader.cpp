@@ -1,5 +1,6 @@
 #include "node/map_loader.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -15,6 +16,8 @@ constexpr std::chrono::milliseconds POLL{2};  // of tf, where a cloud waits for 
 // Where bodies have own voxels each map is to be looked at: that many may be finished while the worker is in a step,
 // and take a share of max_map_mb each at the most. Else the newest alone counts.
 constexpr std::size_t MOST_FINISHED = 4, SHARE_OF_FINISHED = 32;
+
+constexpr std::size_t MOST_WAITING = 64;  // views: a publisher may make up a frame_id for each cloud
 
 }  // namespace
 
@@ -37,20 +40,59 @@ void MapLoader::put(Job job) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!isBusy()) busy_since_ns_ = job.arrival_ns;
-    // A cloud that was left out is in no map.
-    if (job_ && !config_.takesClouds()) job.missed = "they come faster than the node decodes them; send fewer";
-    job_ = std::move(job);
+    std::size_t bytes = job.message.bytes.size();
+    const auto isItsPlace = [&](const Job& one) {
+      return one.message.source == job.message.source && one.view == job.view;
+    };
+    auto waiting = std::find_if(jobs_.begin(), jobs_.end(), isItsPlace);
+    if (waiting == jobs_.end() && jobs_.size() >= MOST_WAITING) {  // what is one more of its source shares a place
+      job.view.clear();
+      waiting = std::find_if(jobs_.begin(), jobs_.end(), isItsPlace);
+    }
+    for (auto one = jobs_.begin(); one != jobs_.end(); ++one) bytes += one == waiting ? 0 : one->message.bytes.size();
+    if (job.problem.empty() && bytes > largestMapMessage(config_)) {
+      job.message.bytes = {};
+      job.problem = "there is no room for it beside others that wait, in the eighth of max_map_mb " +
+                    std::to_string(config_.max_map_bytes >> 20) + " for these";
+    }
+    job.since_ns = job.arrival_ns;
+    if (waiting == jobs_.end()) {
+      jobs_.push_back(std::move(job));
+    } else {
+      ++dropped_;
+      job.since_ns = waiting->since_ns;
+      job.message.is_behind = true;
+      // A cloud that was left out is in no map.
+      if (!config_.takesClouds()) job.missed = "they come faster than the node decodes them; send fewer";
+      *waiting = std::move(job);
+    }
   }
   changed_.notify_one();
 }
 
-void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns, std::int64_t arrival_ns) {
-  put({std::move(bytes), {}, receipt_ns, arrival_ns, {}});
+void MapLoader::submit(CloudMessage message, std::int64_t arrival_ns) {
+  Job job;
+  if (config_.takesClouds()) job.view = frameIdOf(message.bytes);
+  job.message = std::move(message);
+  job.arrival_ns = arrival_ns;
+  put(std::move(job));
 }
 
-void MapLoader::submitFile(const std::string& file, std::int64_t arrival_ns) { put({{}, file, 0, arrival_ns, {}}); }
+void MapLoader::submitFile(const std::string& file, std::int64_t arrival_ns) {
+  Job job;
+  job.file = file;
+  job.arrival_ns = arrival_ns;
+  put(std::move(job));
+}
 
-void MapLoader::refuse(const std::string& problem, std::int64_t arrival_ns) { put({{}, {}, 0, arrival_ns, problem}); }
+void MapLoader::refuse(std::size_t source, const std::string& problem, StampNs receipt_ns, std::int64_t arrival_ns) {
+  Job job;
+  job.message.source = source;
+  job.message.receipt_ns = receipt_ns;
+  job.arrival_ns = arrival_ns;
+  job.problem = problem;
+  put(std::move(job));
+}
 
 void MapLoader::setFixedFrame(const std::string& frame) {
   {
@@ -72,9 +114,10 @@ LoadedMap MapLoader::load(const Job& job) {
   if (!job.file.empty()) return loadMapFile(job.file, config_, &memory_);
   if (job.problem.empty() && config_.takesClouds()) {
     return clouds_.add(
-        job.bytes, job.receipt_ns, [&] { return mayWait(job); }, last_.get());
+        job.message, [&] { return mayWait(job); }, last_.get());
   }
-  if (job.problem.empty()) return decodeMapMessage(job.bytes, config_, &memory_, last_.get());
+  if (job.problem.empty()) return decodeMapMessage(job.message.bytes, config_, &memory_, last_.get());
+  if (config_.takesClouds()) clouds_.refuse(job.message.source, job.message.receipt_ns, job.problem);
   LoadedMap refused;
   refused.problem = job.problem;
   return refused;
@@ -102,6 +145,14 @@ void MapLoader::keep(LoadedMap map) {
   done_.push_back(std::move(map));
 }
 
+/// The one that has waited longest, so that each view has its turn. The mutex is held.
+MapLoader::Job MapLoader::takeJob() {
+  Job job = std::move(jobs_.front());
+  jobs_.erase(jobs_.begin());
+  job.settles_ns = jobs_.empty() ? job.arrival_ns : std::min(job.arrival_ns, jobs_.front().since_ns - 1);
+  return job;
+}
+
 void MapLoader::loop() {
   while (true) {
     Job job;
@@ -109,16 +160,15 @@ void MapLoader::loop() {
       std::unique_lock<std::mutex> lock(mutex_);
       changed_.wait(lock, [this] { return stopping_ || isReady(); });
       if (stopping_) return;
-      job = std::move(*job_);
-      job_.reset();
+      job = takeJob();
       decoding_ = true;
     }
     LoadedMap map = load(job);
-    map.arrival_ns = job.arrival_ns;
-    if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
+    map.arrival_ns = job.settles_ns;
+    if (map.stamp_ns == 0) map.stamp_ns = job.message.receipt_ns;
     if (!job.missed.empty()) map.missed = job.missed;
     if (!map.surface) ++refused_;
-    last_ = map.surface;
+    if (map.surface || !config_.takesClouds()) last_ = map.surface;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       keep(std::move(map));

@@ -41,13 +41,17 @@ class MapLoader {
   MapLoader(const MapLoader&) = delete;
   MapLoader& operator=(const MapLoader&) = delete;
 
-  /// A serialised octomap_msgs/Octomap, or a cloud (PointCloud2) where clouds make the map, that came at `arrival_ns`
-  /// of the steady clock; replaces one that still waits. From any thread.
-  void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns, std::int64_t arrival_ns);
+  /// A serialised octomap_msgs/Octomap, or a cloud where clouds make the map, that came at `arrival_ns` of the steady
+  /// clock; replaces one of the same view that still waits. From any thread.
+  void submit(CloudMessage message, std::int64_t arrival_ns);
   void submitFile(const std::string& file, std::int64_t arrival_ns);
-  /// A message that is refused undecoded takes its turn all the same: it is newer than the map in use, which is void
-  /// with it. From any thread.
-  void refuse(const std::string& problem, std::int64_t arrival_ns);
+  /// A message of a source that is refused undecoded takes its turn all the same: it is newer than the map in use,
+  /// which is void with it. From any thread.
+  void refuse(std::size_t source, const std::string& problem, StampNs receipt_ns, std::int64_t arrival_ns);
+  /// As CloudMapping::setCameraInfo(). From any thread.
+  void setCameraInfo(std::size_t source, const std::string& problem, const std::vector<std::uint8_t>& bytes) {
+    clouds_.setCameraInfo(source, problem, bytes);
+  }
   /// A cloud waits until the fixed frame is known. From any thread.
   void setFixedFrame(const std::string& frame);
   /// The oldest finished map, once.
@@ -59,15 +63,20 @@ class MapLoader {
 
   std::uint64_t received() const { return received_; }
   std::uint64_t refused() const { return refused_; }
+  /// That gave way to a newer one before they were decoded.
+  std::uint64_t dropped() const { return dropped_; }
+  CloudCounters cloudCounters() const { return clouds_.counters(); }
 
  private:
   struct Job {
-    std::vector<std::uint8_t> bytes;
+    CloudMessage message;
     std::string file;
-    StampNs receipt_ns = 0;
     std::int64_t arrival_ns = 0;
-    std::string problem;  // not empty: refused
-    std::string missed;   // why those before it were decoded by nobody; empty: each was
+    std::string problem;          // not empty: refused
+    std::string missed{};         // why those before it were decoded by nobody; empty: each was
+    std::string view{};           // which frame_id of its source; one job of each waits
+    std::int64_t since_ns = 0;    // arrival of the first of the view that nothing has come of
+    std::int64_t settles_ns = 0;  // what came up to then is in the map with this one, or gave way
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
   const MapMemory memory_{config_};
@@ -77,19 +86,22 @@ class MapLoader {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool frame_known_ = false;  // and set in clouds_, which is the thread's from then on
-  std::optional<Job> job_;
+  std::vector<Job> jobs_;     // that wait, one a view, by since_ns
   std::deque<LoadedMap> done_;
   bool stopping_ = false, decoding_ = false;
   std::int64_t busy_since_ns_ = 0;
-  std::atomic<std::uint64_t> received_{0}, refused_{0};
+  std::atomic<std::uint64_t> received_{0}, refused_{0}, dropped_{0};
   std::thread thread_;
 
-  /// Nothing keeps the job that there is from being begun. The mutex is held.
-  bool isReady() const { return job_ && (frame_known_ || !config_.takesClouds() || !job_->problem.empty()); }
+  /// Nothing keeps a job that there is from being begun. The mutex is held.
+  bool isReady() const {
+    return !jobs_.empty() && (frame_known_ || !config_.takesClouds() || !jobs_.front().problem.empty());
+  }
   bool isBusy() const { return isReady() || decoding_ || !done_.empty(); }
   LoadedMap load(const Job& job);
   bool mayWait(const Job& job);
   void put(Job job);
+  Job takeJob();
   void keep(LoadedMap map);
   void loop();
 };

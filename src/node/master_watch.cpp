@@ -16,9 +16,10 @@ constexpr std::chrono::seconds LOOK_AT_PARAMETERS{1};
 
 }  // namespace
 
-MasterWatch::MasterWatch(const std::vector<std::unique_ptr<MeshSubscription>>& meshes, const ros::Subscriber& map,
-                         std::function<void()> answered, std::function<void()> map_published)
-    : meshes_(meshes), map_(map), answered_(std::move(answered)), map_published_(std::move(map_published)) {}
+MasterWatch::MasterWatch(const std::vector<std::unique_ptr<MeshSubscription>>& meshes,
+                         const std::vector<ros::Subscriber>& maps, std::function<void()> answered,
+                         std::function<void()> map_published)
+    : meshes_(meshes), maps_(maps), answered_(std::move(answered)), map_published_(std::move(map_published)) {}
 
 void MasterWatch::watchParameters(std::map<std::string, std::string> held,
                                   std::function<void(std::vector<std::string>)> changed) {
@@ -94,7 +95,8 @@ void MasterWatch::findDead(AwaitedTopic& topic) {
 }
 
 void MasterWatch::look() {
-  if (map_ && map_.getNumPublishers() > 0) map_published_();
+  const auto isPublished = [](const ros::Subscriber& map) { return map.getNumPublishers() > 0; };
+  if (std::any_of(maps_.begin(), maps_.end(), isPublished)) map_published_();
   std::vector<MeshSubscription*> wanting;
   for (const auto& mesh : meshes_) {
     if (mesh && mesh->wantsRenewal()) wanting.push_back(mesh.get());

@@ -30,8 +30,8 @@ struct SilenceQuestion {
 class MasterWatch {
  public:
   /// Renews the subscriptions, null ones left out, from now on. `answered` is called on the watch's thread when
-  /// takeHint() has something new, `map_published` when the map's topic has a publisher. All must outlive the watch.
-  MasterWatch(const std::vector<std::unique_ptr<MeshSubscription>>& meshes, const ros::Subscriber& map,
+  /// takeHint() has something new, `map_published` when a map's topic has a publisher. All must outlive the watch.
+  MasterWatch(const std::vector<std::unique_ptr<MeshSubscription>>& meshes, const std::vector<ros::Subscriber>& maps,
               std::function<void()> answered, std::function<void()> map_published);
   /// Looks once a second whether these parameters, by resolved names, hold what they did. `changed` is called on the
   /// watch's thread with the names of those that do not, whenever these are others. Before start().
@@ -55,7 +55,7 @@ class MasterWatch {
   void lookAtParameters();
 
   const std::vector<std::unique_ptr<MeshSubscription>>& meshes_;
-  const ros::Subscriber& map_;
+  const std::vector<ros::Subscriber>& maps_;
   std::function<void()> answered_, map_published_;
   std::mutex mutex_;
   std::condition_variable ended_;

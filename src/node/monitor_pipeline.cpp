@@ -113,6 +113,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changes;
+  points_no_measurement_ += waiting.mesh.no_measurement;
   if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
   if (waiting_[body]) {  // one that was kept; steps have waited for its transform, and need not do so once more
     monitor_->countDropped(body, StepStatus::NO_TRANSFORM);
@@ -138,6 +139,8 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
     trusted_map_ = std::move(map);
     return;
   }
+  if (!map.note.empty() && map_notes_.insert(map.note).second) map_note_ = map.note;
+  map_slow_ = map.slow;
   unplaced_maps_.push_back({std::move(map), now_ns});
   limitUnplacedMaps();
 }
@@ -168,6 +171,9 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
     promises_.follow(outcome);
   }
   statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken());
+  if (!map_slow_.empty()) {
+    statement_.remedy = outcome.status == StepStatus::NO_MAP ? map_slow_ : joined(statement_.remedy, map_slow_);
+  }
   return true;
 }
 
@@ -186,6 +192,7 @@ StatsContext MonitorPipeline::counters() const {
   context.transforms_unusable = transforms_.unusable();
   context.wrong_row_steps = wrong_row_steps_;
   for (const auto& body : passed_over_) context.markers_passed_over += body.messages;
+  context.points_no_measurement = points_no_measurement_;
   context.parameter_hash = config_.hash();
   context.promises = promises_.promises();
   context.promises_broken = promises_.brokenPromises();

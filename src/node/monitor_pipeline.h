@@ -26,7 +26,10 @@ namespace dccd {
 
 /// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
 /// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
-using LoadedMap = ObstacleMap;
+struct LoadedMap : ObstacleMap {
+  std::string note;  ///< what looks like a mistake in what it was made of; empty: nothing does
+  std::string slow;  ///< that its making takes too long, and what to do; empty: it does not
+};
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
 /// are those of the frame, in its own frame of reference.
@@ -185,7 +188,9 @@ class MonitorPipeline {
   std::optional<LoadedMap> trusted_map_;   // beside live ones
   bool trusted_placed_ = false;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
-  std::string map_note_;
+  std::string map_note_;                                 // to be told
+  std::set<std::string> map_notes_;  // LoadedMap::note, as far as they were told; there are a few for each source
+  std::string map_slow_;             // LoadedMap::slow of the newest one
   std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
   std::string map_doubt_;
   struct ClockFrame {
@@ -198,7 +203,7 @@ class MonitorPipeline {
   std::vector<std::optional<DecodedMesh>> static_meshes_;
   std::optional<LoadedMap> placed_map_;
   bool frame_answered_ = false;  // a step was answered in it
-  std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0;
+  std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0, points_no_measurement_ = 0;
   bool resting_ = false;
   struct OtherMarkers {
     std::uint64_t messages = 0;

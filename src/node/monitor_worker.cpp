@@ -73,9 +73,10 @@ void CollisionMonitor::Impl::takeMaps() {
   }
 }
 
-/// A frame is answered with the map that came before it, as far as that is ready in time and the queue has room.
+/// A frame is answered with the map that came before it, as far as that is ready in time and the queue has room. Where
+/// clouds make the map there is always one on its way: each has answer_timeout_s until it is in use.
 bool CollisionMonitor::Impl::waitsForMap() {
-  const std::optional<std::int64_t> since_ns = maps ? maps->busySince() : std::nullopt;
+  const std::optional<std::int64_t> since_ns = maps && !config.takesClouds() ? maps->busySince() : std::nullopt;
   return since_ns && secondsBetween(*since_ns, steadyNs()) < config.transform_timeout_s &&
          queue.size(config.monitor.clock_body) < config.queue_size;
 }
@@ -119,8 +120,9 @@ std::vector<AwaitedTopic> CollisionMonitor::Impl::silentTopics() {
                       frames > 0, ""});
   }
   const bool may_rest = pipeline.effects().mapSeen() && config.monitor.octomap_timeout_s == 0;
-  if (map_subscriber && pipeline.effects().mapExpected() && !may_rest) {
-    silent.push_back({log.mapSource(), map_subscriber.getNumPublishers(), "", map_publisher_seen, ""});
+  for (const ros::Subscriber& map : map_subscribers) {
+    if (!pipeline.effects().mapExpected() || may_rest) continue;
+    silent.push_back({map.getTopic(), map.getNumPublishers(), "", map_publisher_seen, ""});
   }
   return silent;
 }
@@ -146,6 +148,10 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.frames_handed_over = frames_handed_over;
   context.requests_refused = requests_refused;
   context.maps_refused = maps ? maps->refused() : 0;
+  context.maps_dropped = maps ? maps->dropped() : 0;
+  const CloudCounters clouds = maps ? maps->cloudCounters() : CloudCounters();
+  context.clouds_only_filled = clouds.only_filled;
+  context.points_no_measurement += clouds.no_measurement;
   return context;
 }
 

@@ -2,6 +2,8 @@
 
 #include <ros/names.h>
 
+#include "input/short_text.h"
+
 namespace dccd {
 
 namespace {
@@ -31,12 +33,17 @@ void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
     if (!body.isRigid() && isRemapped(node, body.topic)) body.topic_named = true;
   }
   config.cloud_named = config.cloud_named || isRemapped(node, DEFAULT_CLOUD_TOPIC);
+  // What is beside such a topic is looked for beside what it is called in the end.
+  for (CloudSource& source : config.clouds) source.topic = node.resolveName(source.topic);
   takeOctomapRemapping(node, config);
   config.checkMapNames();
 }
 
 std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
-  return config.takesMapFileAlone() ? config.octomap_file : node.resolveName(config.mapName());
+  if (config.takesMapFileAlone()) return config.octomap_file;
+  std::vector<std::string> topics = config.liveMapNames();
+  for (std::string& topic : topics) topic = node.resolveName(topic);
+  return listOf(topics);
 }
 
 std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {

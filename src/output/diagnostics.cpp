@@ -101,6 +101,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   putValue(status, "refused requests for objects", context.requests_refused);
   putValue(status, "maps received", context.maps_received);
   putValue(status, "maps refused", context.maps_refused);
+  putValue(status, "maps dropped", context.maps_dropped);
   if (map_present_) putValue(status, "map age [s]", map_age_s_);
   outcomes_ = answers_ = 0;
   worst_latency_s_ = 0;

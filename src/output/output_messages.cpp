@@ -288,6 +288,9 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.excluded_voxels = outcome.excluded_voxels;
   out.maps_received = context.maps_received;
   out.maps_refused = context.maps_refused;
+  out.maps_dropped = context.maps_dropped;
+  out.clouds_only_filled = context.clouds_only_filled;
+  out.points_no_measurement = context.points_no_measurement;
   out.markers_built = context.markers_built;
   out.parameter_hash = context.parameter_hash;
   return out;

@@ -58,7 +58,8 @@ struct StatsContext {
   FrameCounters frames;  ///< of all bodies
   std::uint64_t weld_changes = 0;
   double latency_s = 0;
-  std::uint64_t maps_received = 0, maps_refused = 0;
+  std::uint64_t maps_received = 0, maps_refused = 0, maps_dropped = 0;
+  std::uint64_t clouds_only_filled = 0, points_no_measurement = 0;
   std::uint64_t steps_unpublished = 0;  ///< of which not everything was published
   std::uint64_t transforms_unusable = 0;
   std::uint64_t requests_refused = 0;     ///< of ~attach, ~detach and ~remove

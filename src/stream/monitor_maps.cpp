@@ -49,7 +49,7 @@ void Monitor::setMap(ObstacleMap map) {
       one = frames.count(one->first) ? std::next(one) : m.map_seen.erase(one);
     }
   }
-  const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface);
+  const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface && !map.own.doubted_surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
     if (!m.maps_to_come.empty()) m.missed_maps = "they waited for the bodies' frames when the map was void";
     if (!map.missed.empty()) m.missed_maps = std::move(map.missed);

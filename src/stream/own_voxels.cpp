@@ -88,13 +88,20 @@ void describe(const std::vector<TrackedBody>& bodies, bool trust_first, const st
     }
   }
   if (trust_first && !own.excluded.empty()) own.excluded += ", by own_voxels_doubt: trust the first map's, too";
-  if (own.doubt.empty()) return;
-  own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
-  own.doubt += " there in the first map";
-  if (!missed.empty()) own.doubt += " after some that were not looked at (" + missed + ")";
-  own.doubt +=
-      ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it away "
-      "once, or set own_voxels_doubt: trust";
+  if (!own.doubt.empty()) {
+    own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
+    own.doubt += " there in the first map";
+    if (!missed.empty()) own.doubt += " after some that were not looked at (" + missed + ")";
+    own.doubt +=
+        ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it "
+        "away once, or set own_voxels_doubt: trust";
+  }
+  const auto isSeen = [](const OwnVoxel& voxel) { return voxel.body == NOBODY; };
+  const auto seen = static_cast<std::uint64_t>(std::count_if(own.voxels->begin(), own.voxels->end(), isSeen));
+  if (seen == 0) return;
+  own.doubted += seen;
+  own.doubt += (own.doubt.empty() ? "the step touches one of " : "; or one of ") + countOf(seen) +
+               " in which a sensor saw something, but not often enough for an obstacle";
 }
 
 }  // namespace
@@ -103,6 +110,7 @@ void OwnVoxelFinder::forget() {
   before_ = nullptr;
   own_.clear();
   remembered_.clear();
+  seen_.clear();
   missed_.clear();
 }
 
@@ -137,9 +145,11 @@ std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodi
   return ways;
 }
 
-/// The cubes of which it matters whether a body reached them. Forgets own voxels that the map shows no more.
-std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface, const VoxelTree& sure,
+/// The cubes of which it matters whether a body reached them. Forgets own voxels that the map shows no more, and what
+/// was in doubt by its maker: of that the new one is asked for, or taken over where no body is near.
+std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const ObstacleMap& map, const VoxelTree& sure,
                                                     const KeyBox& region) {
+  const VoxelSurface& surface = *map.surface;
   std::vector<ReachedCube> cubes;
   const auto ask = [&](const OccupiedLeaf& leaf, ReachedCube::Why why) {
     cubes.push_back({leaf, why, leafBox(leaf, surface.resolution()), -1});
@@ -167,6 +177,14 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface,
     if (shown && one->second.doubted) ask(leaf, ReachedCube::Why::DOUBTED);
     one = shown ? std::next(one) : own_.erase(one);
   }
+  seen_.clear();
+  if (!map.own.doubted_surface) return cubes;
+  const std::size_t most = cubes.size() + tolerance::MOST_OWN_ASKED;
+  auto askSeen = [&](const OccupiedLeaf& voxel) {
+    if (!meets(voxel, region) || cubes.size() >= most) return seen_.push_back(voxel);
+    ask(voxel, ReachedCube::Why::SEEN);
+  };
+  for (const OccupiedLeaf& leaf : map.own.doubted_surface->impl().tree.leaves()) visitUncovered(sure, leaf, askSeen);
   return cubes;
 }
 
@@ -190,6 +208,9 @@ void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSp
       case ReachedCube::Why::DOUBTED:
         if (!reached) own_.erase(key);
         if (reached && trust_first) own_[key].doubted = false;
+        break;
+      case ReachedCube::Why::SEEN:
+        if (!reached) seen_.push_back(cube.leaf);
         break;
     }
   }
@@ -215,7 +236,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
   const VoxelTree& sure = trusted ? trusted->impl().tree : nothing;
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
-  std::vector<ReachedCube> cubes = cubesToAsk(*map.surface, sure, reachedKeys(map, bodies, ways));
+  std::vector<ReachedCube> cubes = cubesToAsk(map, sure, reachedKeys(map, bodies, ways));
   searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes, &shapes_);
   std::set<int> unknown_yet;
   for (const TrackedBody& body : bodies) {
@@ -228,6 +249,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   before_ns_ = map.stamp_ns;
 
   ObstacleMap next = map;
+  next.own = OwnVoxels();
   next.own.looked_at = static_cast<std::uint64_t>(std::count_if(
       cubes.begin(), cubes.end(), [](const ReachedCube& cube) { return cube.why == ReachedCube::Why::APPEARED; }));
   return withoutOwn(std::move(next), trusted, bodies, trust_first);
@@ -250,6 +272,7 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   std::vector<OwnVoxel> voxels;
   for (const auto& one : own_) voxels.push_back(one.second);
   std::sort(voxels.begin(), voxels.end(), [](const OwnVoxel& a, const OwnVoxel& b) { return a.key < b.key; });
+  for (const OccupiedLeaf& leaf : seen_) voxels.push_back({leaf.min, NOBODY, true});
   std::vector<OccupiedLeaf> doubted;
   for (const OwnVoxel& voxel : voxels) {
     if (voxel.doubted) doubted.push_back({voxel.key, 1});

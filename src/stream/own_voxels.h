@@ -12,6 +12,8 @@
 //    obstacle, but no proof either of a step that touches it, until a map does not show it, or shows it with no body in
 //    reach, which makes it an obstacle. After maps that were not looked at all is in doubt that is not an obstacle.
 // 6. Where a body is gone, nothing is its own any more.
+// 7. A voxel in which the map's maker has seen something, but not often enough for an obstacle, is in doubt, unless a
+//    body's surface was within own_voxels_m of it at that time.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +27,9 @@
 #include "stream/reach_search.h"
 
 namespace dccd {
+
+/// OwnVoxel::body where a voxel is in doubt by (7). ObstacleMap::own.doubted_surface of a map that is given has these.
+constexpr std::uint16_t NOBODY = 0xffff;
 
 /// Not thread-safe.
 class OwnVoxelFinder {
@@ -53,7 +58,7 @@ class OwnVoxelFinder {
 
  private:
   std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
-  std::vector<ReachedCube> cubesToAsk(const VoxelSurface& surface, const VoxelTree& sure, const KeyBox& region);
+  std::vector<ReachedCube> cubesToAsk(const ObstacleMap& map, const VoxelTree& sure, const KeyBox& region);
   /// unknown_yet: bodies of which nothing is known as old as the map.
   void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
               const std::set<int>& unknown_yet);
@@ -67,6 +72,7 @@ class OwnVoxelFinder {
   std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
   std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
   RigidShapes shapes_;                               // of bodies that have been asked about
+  std::vector<OccupiedLeaf> seen_;                   // by (7), of the last map
   std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
   std::string missed_;                               // why maps were not looked at since the last one; empty: all were
   std::string doubts_missed_;                        // the same, where some doubt is for that reason

@@ -25,7 +25,7 @@ using BodyWay = std::vector<MeshStore::Stretch>;
 
 /// A cube, why it is asked for, and the body that reaches it.
 struct ReachedCube {
-  enum class Why : std::uint8_t { APPEARED, VANISHED, REMEMBERED, DOUBTED };
+  enum class Why : std::uint8_t { APPEARED, VANISHED, REMEMBERED, DOUBTED, SEEN };
   OccupiedLeaf leaf;
   Why why;
   LeafBox box;

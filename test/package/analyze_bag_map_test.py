@@ -2,10 +2,12 @@
 import copy
 import csv
 import json
+import struct
 import unittest
 
 import genpy
 from geometry_msgs.msg import Pose, PoseArray
+from sensor_msgs.msg import CameraInfo, Image
 from visualization_msgs.msg import MarkerArray
 
 from analyze_bag_support import AnalyzeBagTestCase
@@ -57,12 +59,27 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         for frame in self.cloths:
             messages += [('/points', plate, frame[2] - genpy.Duration.from_sec(0.001)), frame]
         clouded = self.write('clouded.bag', messages)
-        words = self.params('obstacle_cloud_topic: points\nobstacle_resolution_m: 0.02\n')
+        given = 'obstacle_cloud_topic: points\nobstacle_resolution_m: 0.02\nobstacle_sensor_frame: world\n'
+        words = self.params(given)
         status, said, complaints, statuses = self.analyzed('clouded', clouded, *words)
         self.assertEqual((status, set(statuses)), (0, {'FIRST_FRAME', 'OK'}), complaints)
         self.assertIn('octomap: /points (named)', said)
         with open(self.folder / 'clouded/contacts.csv') as file:
             self.assertIn('octomap', {row['body_1'] for row in csv.DictReader(file)})
+        # The same as depth pictures, whose CameraInfo comes late.
+        info = CameraInfo(height=100, width=100, P=[49.5 * height, 0, 49.5, 0, 0, 49.5 * height, 49.5, 0, 0, 0, 1, 0])
+        pictures = []
+        for frame in self.cloths:
+            picture = Image(height=100, width=100, encoding='32FC1', step=400, data=struct.pack('<f', height) * 10000)
+            picture.header = plate.header
+            at = frame[2] - genpy.Duration.from_sec(0.001)
+            pictures += [('/depth/image', picture, at), ('/depth/camera_info', info, at), frame]
+        seen = self.params('obstacle_cloud_topic: depth/image\nobstacle_resolution_m: 0.02\n')
+        status, _, complaints, statuses = self.analyzed('pictured', self.write('pictured.bag', pictures), *seen)
+        self.assertEqual((status, set(statuses)), (0, {'FIRST_FRAME', 'OK'}), complaints)
+        with open(self.folder / 'pictured/contacts.csv') as file:
+            self.assertIn('octomap', {row['body_1'] for row in csv.DictReader(file)})
+        words = self.params(given)
         status, _, complaints, statuses = self.analyzed('cloudless', self.bag, *words)
         self.assertEqual((status, set(statuses)), (3, {'FIRST_FRAME', 'NO_MAP'}))
         self.assertIn('the bag has no cloud on /points, which is to make the map', self.said)

@@ -16,7 +16,7 @@ SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty
             'readRobotParameters': 'robot/', 'readSensorModel': 'sensor_model/'}
 # Where a page names a family at once.
 # These read the fields of an entry of a list, which the list's own row explains.
-ENTRIES = {'readSeparationPair', 'readPartners', 'readExpectation', 'readLink'}
+ENTRIES = {'readCloudSource', 'readSeparationPair', 'readPartners', 'readExpectation', 'readLink'}
 
 
 def functions(text):
@@ -91,7 +91,7 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
         numbers = numbers_of_bodies()
         self.assertEqual(numbers, {'minimum_separation_m', 'own_voxels_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale',
-                                   'topology/max_edge_m', 'topology/max_range_m', 'max_speed_m_s', 'max_acceleration_m_s2'})
+                                   'topology/max_edge_m', 'topology/min_range_m', 'topology/max_range_m', 'max_speed_m_s', 'max_acceleration_m_s2'})
         self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):

@@ -134,7 +134,8 @@ class LaunchTest(unittest.TestCase):
         """A remapping names a topic, and it holds for the resolved name, too: what the file calls /mesh would be sent
         elsewhere."""
         named = {'octomap_server.launch': ({'octomap_topic': 'octomap_binary'}, {'octomap_binary:=/octomap_binary'}),
-                 'realsense.launch': ({'obstacle_cloud_topic': 'obstacle_cloud'}, {'obstacle_cloud:=/camera/depth/color/points'})}
+                 'realsense.launch': ({'obstacle_cloud_topic': 'obstacle_cloud'}, {'obstacle_cloud:=/camera/depth/color/points'}),
+                 'sensor.launch': ({'obstacle_cloud_topic': '/camera/depth/image_raw'}, set())}
         for path in LAUNCH_FILES:
             with self.subTest(path.name):
                 parameters = self.parameters(path)
@@ -274,7 +275,7 @@ class ArgumentsTest(unittest.TestCase):
     def test_all_launch_files_pass_all_arguments_on(self):
         monitor = arguments_of(CHECKOUT / 'launch/monitor.launch')
         self.assertGreater(len(monitor), 12)
-        self.assertEqual(len(PRESETS), 6)
+        self.assertEqual(len(PRESETS), 7)
         for path in LAUNCH_FILES:
             for include in ElementTree.parse(path).getroot().findall('include'):
                 included = CHECKOUT / 'launch' / pathlib.Path(include.get('file')).name

@@ -2,6 +2,9 @@
 // back, its tf stops, it sends what is no cloud. What is missing stands in ~state, and is there again afterwards.
 #include <atomic>
 
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+
 #include "ros/support/live_tests.h"
 #include "ros/support/missing.h"
 #include "ros/support/rate.h"
@@ -62,6 +65,66 @@ TEST_F(Seeing, SaysWhatOfTheCameraIsMissing) {
   EXPECT_NE(state.last().excluded.at(0).find("as own of body 'mesh'"), std::string::npos) << state.last().reason;
   EXPECT_GT(stats.last().maps_refused, 0u);
   EXPECT_LT(stats.last().maps_refused, stats.last().maps_received);
+}
+
+struct SeeingTwice : StateTest {
+  SeeingTwice() : StateTest("/seeing_twice") {}
+
+  /// What the camera below the origin sees of a plate above the sheet.
+  static sensor_msgs::Image picture(float depth_m) {
+    sensor_msgs::Image out;
+    out.header.stamp = ros::Time::now();
+    out.header.frame_id = "camera";
+    out.width = out.height = 32;
+    out.encoding = "32FC1";
+    out.step = 4 * out.width;
+    const std::vector<float> depths(out.width * out.height, depth_m);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(depths.data());
+    out.data.assign(bytes, bytes + 4 * depths.size());
+    return out;
+  }
+  static sensor_msgs::CameraInfo info() {
+    sensor_msgs::CameraInfo out;
+    out.width = out.height = 32;
+    out.P = {32, 0, 15.5, 0, 0, 32, 15.5, 0, 0, 0, 1, 0};
+    return out;
+  }
+};
+
+TEST_F(SeeingTwice, TakesPicturesAndCloudsAndSaysWhichCameraIsMissing) {
+  const auto mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/seeing_twice/mesh");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
+  const Rate transforms(50, [&] {
+    tf.publish(transformAt(ros::Time::now().toSec(), "camera", {0, 0, -1}));
+    tf.publish(transformAt(ros::Time::now().toSec(), "other", {0, 0, -1}));
+  });
+  const Rate cloth(30, [&] { mesh.publish(meshStamped(sheetAt(1, 4, 4), ros::Time::now().toSec())); });
+  std::atomic<float> depth_m{3};
+  std::atomic<bool> knows_pinhole{false};
+  ros::Publisher infos = node.advertise<sensor_msgs::CameraInfo>("/seeing_twice/depth/camera_info", 1);
+  const auto pictures = advertiseAndWait<sensor_msgs::Image>(node, "/seeing_twice/depth/image");
+  const Rate camera(15, [&] {
+    if (knows_pinhole) infos.publish(info());
+    pictures.publish(picture(depth_m));
+  });
+  EXPECT_TRUE(misses("no CameraInfo has come on /seeing_twice/depth/camera_info")) << state.last().reason;
+  knows_pinhole = true;
+  EXPECT_TRUE(misses("no cloud has come on /seeing_twice/points yet")) << state.last().reason;
+  const auto points = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/seeing_twice/points");
+  {
+    const Rate other(100, [&] {
+      points.publish(cloud({{0.5, 0.5, 3}, {0.6, 0.5, 3}}, ros::Time::now().toSec(), "other"));
+    });
+    EXPECT_TRUE(becomesProved()) << state.last().reason;
+    depth_m = 0;
+    EXPECT_TRUE(misses("none of its 1024 points is a measurement")) << state.last().reason;
+    EXPECT_TRUE(misses("'camera' on /seeing_twice/depth/image was refused")) << state.last().reason;
+    depth_m = 3;
+    EXPECT_TRUE(becomesProved()) << state.last().reason;
+    EXPECT_GE(stats.last().points_no_measurement, 1024u);
+  }
+  EXPECT_TRUE(misses("no cloud 'other' on /seeing_twice/points has come for longer than octomap_timeout_s"))
+      << state.last().reason;
 }
 
 }  // namespace

@@ -27,6 +27,7 @@ static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplayS
   StatsContext context = pipeline.counters();
   context.maps_received = so_far.maps;
   context.maps_refused = so_far.maps_refused;
+  context.points_no_measurement += so_far.points_no_measurement;
   return context;
 }
 

@@ -68,6 +68,25 @@ TEST(DepthSurface, APlaneIsTwoTrianglesASquare) {
   for (const Vec3& p : surface.positions) EXPECT_EQ(p.z(), 1.0) << "the camera's own bits";
 }
 
+// 12 x 12 zeros made 529 contacts at the camera's place.
+TEST(DepthSurface, PixelsAtTheOriginAreNoMeasurement) {
+  Image image(12, 12);
+  for (std::size_t row = 2; row < 6; ++row) {
+    for (std::size_t col = 2; col < 6; ++col) {
+      std::memset(image.bytes.data() + row * image.rowStep() + 32 * col, 0, 12);
+    }
+  }
+  const DepthSurface surface = depthSurface(image.view(), options(0.15));
+  EXPECT_EQ(surface.no_measurement, 16u);
+  EXPECT_EQ(surface.positions.size(), 144u - 16);
+  for (const Vec3& p : surface.positions) EXPECT_EQ(p.z(), 1.0);
+  DepthSurfaceOptions from_two_metres = options(0.15);
+  from_two_metres.min_range_m = 2;
+  EXPECT_THROW(depthSurface(image.view(), from_two_metres), DepthSurfaceError);
+  std::fill(image.bytes.begin(), image.bytes.end(), 0);
+  EXPECT_THROW(depthSurface(image.view(), options(0.15)), DepthSurfaceError) << "it sees nothing";
+}
+
 TEST(DepthSurface, NoTriangleSpansAStepThatIsDeeperThanTheLongestEdge) {
   // Columns 0 to 2 at 1 m, columns 3 to 5 at 1.3 m: across the step edges are 0.316 m long, diagonals 0.332 m.
   Image image(4, 6);

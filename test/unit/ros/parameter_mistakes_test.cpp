@@ -104,6 +104,15 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"obstacle_resolution_m: 0.0005, obstacle_max_range_m: 5.0",
        "~obstacle_resolution_m is 0.0005, too fine for obstacle_max_range_m 5: a ray has 4096 voxels at most; write at "
        "least 0.0012207"},
+      {"obstacle_cloud_topics: []", "~obstacle_cloud_topics is empty; remove it, or name the clouds' topics"},
+      {"obstacle_cloud_topics: [/a, {topic: /a}]", "~obstacle_cloud_topics has '/a' twice"},
+      {"obstacle_cloud_topics: [{frame: /a}]", "~obstacle_cloud_topics/0/"},
+      {"obstacle_cloud_topics: [/a], obstacle_sensor_frame: b",
+       "~obstacle_sensor_frame has no place beside obstacle_cloud_topics"},
+      {"obstacle_min_range_m: 2.0, obstacle_max_range_m: 1.0",
+       "~obstacle_min_range_m is 2, which leaves nothing of obstacle_max_range_m 1"},
+      {"obstacle_no_return: clear", "~obstacle_no_return"},
+      {"obstacle_box: [0, 0, 0, 1, -1, 1]", "~obstacle_box is empty"},
       {"accuracy: exact, minimum_separation_m: 0.01",
        "~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
        "separation: write accuracy: conservative"},

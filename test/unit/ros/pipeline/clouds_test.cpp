@@ -1,90 +1,24 @@
 // A map that is made of a sensor's clouds: what a step meets, and what is said of clouds that cannot become part of it.
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <thread>
 
-#include "dccd/assurance.h"
-#include "input/steady_clock.h"
-#include "unit/ros/pipeline/driven_pipeline.h"
+#include "unit/ros/pipeline/cloud_scene.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
-constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
-
-/// A camera 1.05 m above the world's origin that looks straight down.
-geometry_msgs::TransformStamped cameraPose(double stamp_s) {
-  geometry_msgs::TransformStamped pose;
-  pose.header.stamp = ros::Time(stamp_s);
-  pose.header.frame_id = "world";
-  pose.child_frame_id = "camera";
-  pose.transform.translation.z = 1.05;
-  pose.transform.rotation.x = 1;  // half a turn about x: it sees along the world's -z, its y is the world's -y
-  return pose;
-}
-
-sensor_msgs::PointCloud2 cloudOf(double stamp_s, const std::vector<std::array<float, 3>>& points,
-                                 const std::string& frame = "camera") {
-  sensor_msgs::PointCloud2 out;
-  out.header.stamp = ros::Time(stamp_s);
-  out.header.frame_id = frame;
-  out.height = 1;
-  out.width = static_cast<std::uint32_t>(points.size());
-  addFields({"x", "y", "z"}, out);
-  out.point_step = 12;
-  out.row_step = 12 * out.width;
-  out.data.resize(out.row_step);
-  if (!points.empty()) std::memcpy(out.data.data(), points.data(), out.data.size());
-  return out;
-}
-
-/// The top of a table at the world's z = 0.05, within its uppermost layer of voxels, 0 to 0.1; with lost pixels.
-sensor_msgs::PointCloud2 tableFrom(double stamp_s, const std::string& frame = "camera") {
-  std::vector<std::array<float, 3>> points{{LOST, LOST, LOST}};
-  for (int i = 0; i < 40; ++i) {
-    for (int k = 0; k < 40; ++k) {
-      points.push_back({0.0125f + 0.0125f * static_cast<float>(i), -0.0125f - 0.0125f * static_cast<float>(k), 1});
-    }
-  }
-  return cloudOf(stamp_s, points, frame);
-}
-
-XmlRpcValue cloudScene(const std::string& more = "") {
-  XmlRpcValue tree = scene(more);
-  tree["obstacle_cloud_topic"] = "/camera/points";
-  tree["obstacle_resolution_m"] = 0.1;
-  return tree;
-}
-
 class Clouds : public ::testing::Test {
  protected:
-  Driven driven{cloudScene()};
-  MapMemory memory{driven.config};
-  CloudMapping clouds{driven.config, driven.feed_tf, memory};
+  Seen driven;
 
-  Clouds() { clouds.setFrame("world"); }
-  void tf(double stamp_s) {
-    tf2_msgs::TFMessage message;
-    message.transforms.push_back(cameraPose(stamp_s));
-    driven.feed_tf.add(message, false);
+  void tf(double stamp_s) { driven.tell({cameraPose(stamp_s)}); }
+  LoadedMap add(const sensor_msgs::PointCloud2& cloud, double seconds_later = 0) {
+    return driven.add(cloud, 0, seconds_later);
   }
-  LoadedMap add(const sensor_msgs::PointCloud2& cloud) {
-    return clouds.add(bytesOf(cloud), 0, [] { return false; });
-  }
-  /// As the worker gives it on.
-  void give(LoadedMap map) {
-    if (!map.surface) map.problem = whyRefused(map.problem, driven.config);
-    driven.pipeline.setMap(std::move(map), 0);
-  }
+  void give(LoadedMap map) { driven.give(std::move(map)); }
 };
-
-void showCamera(Driven& scene) {
-  tf2_msgs::TFMessage message;
-  message.transforms.push_back(cameraPose(1));
-  scene.feed_tf.add(message, true);
-}
 
 TEST_F(Clouds, ATableIsMetWhereTheCameraSawIt) {
   driven.feed(1, 0.35f);
@@ -142,22 +76,20 @@ TEST_F(Clouds, WhatCannotBecomePartOfTheMapIsSaid) {
   driven.feed(stamp_s, 0.35f);
   for (const auto& [cloud, expected] : cases) {
     SCOPED_TRACE(expected);
-    give(add(tableFrom(1)));
+    give(add(tableFrom(1), 20));  // so that a sensor of another name is forgotten
     EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::OK) << driven.outcome.reason;
     give(add(cloud));
     EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::NO_MAP) << "the map is void";
     EXPECT_NE(driven.outcome.reason.find(expected), std::string::npos) << driven.outcome.reason;
   }
-  give(add(tableFrom(1)));
+  give(add(tableFrom(1), 20));
   EXPECT_EQ(driven.feed(stamp_s + 0.1, 0.35f).status, StepStatus::OK) << "and what was seen is not lost";
 }
 
 TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
-  Driven occupied(cloudScene("unknown_space: occupied, unknown_box: [0, 0, 0, 1, 1, 1]"));
-  CloudMapping mapping(occupied.config, occupied.feed_tf, memory);
-  mapping.setFrame("world");
-  showCamera(occupied);
-  const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
+  Seen occupied(cloudScene("unknown_space: occupied, unknown_box: [0, 0, 0, 1, 1, 1]"));
+  occupied.showCamera();
+  const LoadedMap map = occupied.add(tableFrom(1));
   ASSERT_TRUE(map.known) << map.problem;
   EXPECT_TRUE(map.known->isKnown(Box{{0.05, 0.05, 0.05}, {0.2, 0.2, 0.3}}));
   EXPECT_FALSE(map.known->isKnown(Box{{0.05, 0.05, -0.15}, {0.4, 0.4, -0.1}})) << "under the table";
@@ -167,12 +99,9 @@ TEST_F(Clouds, AnOctreeThatIsTooLargeIsRefusedWithWhatToDo) {
   XmlRpcValue tree = cloudScene();
   tree["obstacle_resolution_m"] = 0.001;
   tree["max_map_mb"] = 1;
-  Driven small(tree);
-  const MapMemory little(small.config);
-  CloudMapping mapping(small.config, small.feed_tf, little);
-  mapping.setFrame("world");
-  showCamera(small);
-  const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
+  Seen small(tree);
+  small.showCamera();
+  const LoadedMap map = small.add(tableFrom(1));
   EXPECT_EQ(map.surface, nullptr);
   EXPECT_NE(map.problem.find("a quarter of max_map_mb 1 is for it: raise that or obstacle_resolution_m"),
             std::string::npos)
@@ -185,13 +114,10 @@ TEST_F(Clouds, OneWhoseMapIsRefusedForMemoryLeavesInDoubtWhatTheNextOneShows) {
     XmlRpcValue tree = cloudScene();
     tree["own_voxels_m"] = "auto";
     tree["max_map_mb"] = 160;
-    Driven owner(tree);
-    const MapMemory own_memory(owner.config);
-    CloudMapping mapping(owner.config, owner.feed_tf, own_memory);
-    mapping.setFrame("world");
-    showCamera(owner);
+    Seen owner(tree);
+    owner.showCamera();
     const auto see = [&](const sensor_msgs::PointCloud2& cloud) {
-      LoadedMap map = mapping.add(bytesOf(cloud), 0, [] { return false; });
+      LoadedMap map = owner.add(cloud);
       const bool is_map = map.surface != nullptr;
       owner.pipeline.setMap(std::move(map), 0);
       return is_map;
@@ -208,7 +134,7 @@ TEST_F(Clouds, OneWhoseMapIsRefusedForMemoryLeavesInDoubtWhatTheNextOneShows) {
     }
     const std::shared_ptr<const KnownSpace> old = KnownSpace::build(0.1, many);
     for (std::size_t bytes = 0; refused && bytes < std::size_t{60} << 20; bytes += old->memoryBytes()) {
-      held.push_back(own_memory.counted(old));
+      held.push_back(owner.memory.counted(old));
     }
     EXPECT_EQ(see(obstacle), !refused);
     owner.feed(1.2, 0.9f);
@@ -236,7 +162,7 @@ TEST_F(Clouds, TheLoaderWaitsForTheFrameAndForTf) {
   tree["transform_timeout_s"] = 60.0;
   Driven learning(tree);
   MapLoader loader(learning.config, learning.feed_tf, [] {});
-  loader.submit(bytesOf(tableFrom(1)), 0, steadyNs());
+  loader.submit(messageOf(tableFrom(1)), steadyNs());
   EXPECT_FALSE(loader.busySince()) << "no frame is to wait for a cloud that waits for the frame's frame";
   loader.setFixedFrame("world");
   EXPECT_TRUE(loader.busySince());
@@ -255,7 +181,7 @@ TEST_F(Clouds, TheLoaderWaitsForTheFrameAndForTf) {
 TEST_F(Clouds, TheLoaderRefusesWhatTfDoesNotPlaceInTime) {
   MapLoader loader(driven.config, driven.feed_tf, [] {});
   const std::int64_t start_ns = steadyNs();
-  loader.submit(bytesOf(tableFrom(1)), 0, start_ns);
+  loader.submit(messageOf(tableFrom(1)), start_ns);
   const LoadedMap loaded = next(loader);
   EXPECT_NE(loaded.problem.find("no transform from 'camera' to 'world'"), std::string::npos) << loaded.problem;
   EXPECT_GE(secondsBetween(start_ns, steadyNs()), driven.config.transform_timeout_s);

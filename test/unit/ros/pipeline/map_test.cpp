@@ -35,12 +35,12 @@ TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
   const std::pair<std::string, std::size_t> refusals[] = {{"std_msgs/Bool", 1},
                                                           {"octomap_msgs/Octomap", std::size_t{2} << 20}};
   for (const auto& [datatype, size] : refusals) {
-    loader.submit(map(1), 0, 0);
+    loader.submit({0, "octomap_msgs/Octomap", map(1), 0}, 0);
     take();
     EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::OK) << driven.outcome.reason;
     const std::string problem = mapMessageProblem(datatype, "*", size, driven.config);
     ASSERT_FALSE(problem.empty()) << datatype;
-    loader.refuse(problem, 0);
+    loader.refuse(0, problem, 0, 0);
     take();
     EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::NO_MAP) << datatype << ", " << size << " bytes";
     EXPECT_NE(driven.outcome.reason.find(problem), std::string::npos) << driven.outcome.reason;

@@ -120,7 +120,7 @@ TEST_F(OwnVoxelsOfANode, TheLoaderKeepsFinishedMapsAndSaysWhichCameAfterOthers) 
       ++count;
       const std::lock_guard<std::mutex> wait(decoding);
     });
-    const auto submit = [&](int stamp_s) { loader.submit(map(stamp_s), 0, stamp_s); };
+    const auto submit = [&](int stamp_s) { loader.submit({0, "octomap_msgs/Octomap", map(stamp_s), 0}, stamp_s); };
     const auto finished = [&](int maps) {
       while (count < maps) std::this_thread::yield();
     };
