@@ -1,7 +1,10 @@
 // What is asked of the core: detect, pairs, explain, replay.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <future>
 #include <mutex>
@@ -53,7 +56,9 @@ Answer detectStep(py::handle bodies, py::handle voxels, py::handle history, cons
 struct PairRow {
   double toc_lower, toc_upper;
   bool contact, undecided;
+  std::array<std::uint8_t, 6> rest;  // to the next row: written as well, so that equal answers have equal bytes
 };
+static_assert(sizeof(PairRow) == offsetof(PairRow, rest) + sizeof(PairRow::rest), "no byte is left out");
 
 /// A number of PairKind, or a name of its table.
 PairKind kindOf(py::handle kind) {
@@ -95,7 +100,7 @@ py::array rowsOf(const std::vector<ElementaryResult>& results) {
   py::array rows(*TYPE, static_cast<py::ssize_t>(results.size()));
   auto* row = static_cast<PairRow*>(rows.mutable_data());
   for (const ElementaryResult& r : results) {
-    *row = {r.toc_lower, r.toc_upper, r.verdict == Verdict::CONTACT, r.verdict == Verdict::UNDECIDED};
+    *row = {r.toc_lower, r.toc_upper, r.verdict == Verdict::CONTACT, r.verdict == Verdict::UNDECIDED, {}};
     // Of what does not touch the rungs say no time.
     if (r.verdict == Verdict::NO_CONTACT) row->toc_lower = row->toc_upper = HUGE_VAL;
     ++row;

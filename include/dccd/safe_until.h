@@ -16,8 +16,10 @@ namespace dccd {
 /// What is assumed of a body's speed after a step.
 struct SpeedBound {
   static constexpr double NONE = std::numeric_limits<double>::infinity();
-  double max_m_s = NONE;  ///< no vertex is faster [m/s], 0 or more; NONE: nobody says, and nothing is promised of it
-  /// Above 0: this many times the speed of the body's fastest vertex in the step, in the place of max_m_s.
+  /// No vertex is ever faster, at full speed either [m/s], 0 or more; NONE: nobody says.
+  double max_m_s = NONE;
+  /// Above 0: until the next frame no vertex is faster than this many times the body's fastest one in the step, either.
+  /// What a promise rests on is the less of the two. SpeedScale, which is what an arm may set off by, goes by max_m_s.
   double last_step_factor = 0;
   bool slows_down = true;  ///< SpeedScale slows it; false: it goes on as fast, whatever the scale
 };
@@ -28,7 +30,9 @@ constexpr double MOST_PROMISED_S = 10;
 /// No contact of two partners that is not expected comes before until_ns.
 ///
 /// Theorem. Let d be the distance of two partners at the step's end, less what the step holds them apart (minimum
-/// separation), and v the sum of their bounds. Then they do not touch before the end + d / v.
+/// separation), and v the sum of their bounds. Then they do not touch before the end + d / v. Of two bodies of which
+/// one is inside of the other, closed one, d is 0, however far apart their surfaces are: they touch. So it is where
+/// nobody knows: they met in the step, or the budget cut the search for what is inside, and the boxes around them meet.
 /// Proof. A point of a face or an edge is a mean of its vertices, with weights that stay; no vertex goes further than
 /// its bound times the time, so neither does the point. Two points that are d apart need d / v to meet.
 /// It rests on this:
@@ -63,6 +67,15 @@ struct SafeUntil {
 /// std::invalid_argument naming the body whose bound is NaN or below 0.
 DCCD_EXPORT SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& bounds);
 
+/// What became of promises. Those that are neither kept nor void nobody has looked at: a reset came before the next
+/// answer, or none has come.
+struct PromiseCounts {
+  std::uint64_t made = 0;
+  std::uint64_t kept = 0;  ///< the next answer shows nothing else
+  std::uint64_t broken = 0;
+  std::uint64_t unseen() const { return made - kept - broken; }
+};
+
 /// Holds each promise against the next answer: was a body faster than was assumed, or has the map new voxels? What it
 /// does not find may still have happened between the two. Not thread-safe.
 class DCCD_EXPORT PromiseWatch {
@@ -71,20 +84,25 @@ class DCCD_EXPORT PromiseWatch {
   void setBounds(std::vector<SpeedBound> bounds) { bounds_ = std::move(bounds); }
   /// The next promise, after a look at the last one. Of an outcome without an answer none, and the last one stands.
   const SafeUntil& follow(const Outcome& outcome);
+  /// What the promise rests on has changed, as which contacts are expected, or which bodies there are: it is void from
+  /// now on, and the next answer says so. `why`: a sentence. Without a promise that stands nothing happens.
+  void revoke(const std::string& why);
   /// Nothing is looked back on, as after a reset.
   void forget();
 
   const SafeUntil& promise() const { return promise_; }
-  /// Why the promise before this one was void; empty: it was not, as far as both answers tell, or there was none.
+  /// Why the promise before this one, or the one that was revoked, was void; empty: it was not, as far as both answers
+  /// tell, or there was none.
   const std::string& broken() const { return broken_; }
-  std::uint64_t promises() const { return promises_; }
-  std::uint64_t brokenPromises() const { return broken_promises_; }
+  /// revoke() has taken the promise back, and no answer has come since.
+  bool isRevoked() const { return !revoked_.empty(); }
+  const PromiseCounts& counts() const { return counts_; }
 
  private:
   std::vector<SpeedBound> bounds_;
   SafeUntil promise_;
-  std::string broken_;
-  std::uint64_t promises_ = 0, broken_promises_ = 0;
+  std::string broken_, revoked_;  // the latter until the next answer
+  PromiseCounts counts_;
   // Of the last promise: what it was made of.
   std::shared_ptr<const Step> step_;
   std::shared_ptr<const VoxelSurface> obstacle_;
@@ -117,7 +135,8 @@ struct SpeedScale {
 };
 
 /// The least over all pairs of two bodies, or of one and the map, that are not expected to touch, and of which
-/// something slows down; 0 where safeUntil() promises nothing for lack of an answer or of a bound, and where something
+/// something slows down, be it at rest now; 0 where safeUntil() promises nothing for lack of an answer, where the full
+/// speed of one of them is not known (SpeedBound::max_m_s), where one may be inside of the other, and where something
 /// unexpected touches anew, be it a body and itself. What else stands in the way of a proof (Assurance) is the caller's
 /// matter. Throws as safeUntil() does, and names a number of the law that is not finite or below 0.
 DCCD_EXPORT SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds, const SpeedLaw& law);

@@ -86,11 +86,13 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
 
 /// Empty: there were none.
 std::string promisesInWords(const BagReplaySummary& summary) {
-  if (summary.promises == 0) return "";
+  const PromiseCounts& promises = summary.promises;
+  if (promises.made == 0) return "";
   std::ostringstream text;
-  text << "safe until: " << summary.promises << " promises of " << quantile(summary.promised_s, 0.5)
-       << " s in the middle, " << summary.promises - summary.promises_broken << " kept, " << summary.promises_broken
-       << " void" << (summary.first_broken.empty() ? "" : "; the first: ") << summary.first_broken;
+  text << "safe until: " << promises.made << (promises.made == 1 ? " promise of " : " promises of ") << quantile(summary.promised_s, 0.5)
+       << " s in the middle, " << promises.kept << " kept, " << promises.broken << " void, " << promises.unseen()
+       << " not looked at" << (summary.first_broken.empty() ? "" : "; the first that was void: ")
+       << summary.first_broken;
   return text.str();
 }
 

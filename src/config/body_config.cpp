@@ -19,7 +19,6 @@ SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback) {
   if (!section.has("max_speed_m_s")) return speed;
   const double max_m_s = section.number("max_speed_m_s", 0, LARGE);
   speed.max_m_s = max_m_s > 0 ? max_m_s : SpeedBound::NONE;
-  speed.last_step_factor = 0;
   return speed;
 }
 

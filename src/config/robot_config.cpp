@@ -53,10 +53,7 @@ RobotConfig readRobotParameters(ParameterReader section) {
   robot.max_own_voxels = section.integer("max_own_voxels", robot.max_own_voxels, 0, MANY);
   robot.scale = section.number("scale", robot.scale, 1e-6, 1e6);
   if (section.has("max_speed_m_s")) robot.speed = speedBoundOf(section, {});
-  if (section.has("speed_factor")) {
-    if (robot.speed) section.fail("speed_factor", "and max_speed_m_s exclude each other; remove one of both");
-    robot.speed.emplace().last_step_factor = section.number("speed_factor", 1, 1e6);
-  }
+  if (section.has("speed_factor")) robot.speed_factor = section.number("speed_factor", 1, 1e6);
   robot.visuals = section.get("visuals", robot.visuals);
   robot.against_links = section.get("against_links", robot.against_links);
   robot.against_map = section.get("against_map", robot.against_map);
@@ -161,6 +158,12 @@ double RobotConfig::scaleOf(const std::string& link) const {
 double RobotConfig::paddingOf(const std::string& link) const {
   const auto own = links.find(link);
   return own == links.end() ? padding_m : own->second.padding_m.value_or(padding_m);
+}
+
+SpeedBound RobotConfig::speedOr(const SpeedBound& otherwise) const {
+  SpeedBound bound = speed.value_or(otherwise);
+  bound.last_step_factor = speed_factor;
+  return bound;
 }
 
 std::vector<std::string> namesOf(const Robot& robot) {

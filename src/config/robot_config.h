@@ -35,6 +35,7 @@ struct RobotConfig {
   double scale = 1;                 ///< of the geometry about the link's origin
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link
   std::optional<SpeedBound> speed;  ///< of each link
+  double speed_factor = 0;          ///< SpeedBound::last_step_factor of each link
   std::size_t max_own_voxels = 0;   ///< of the links and of what they hold; with more nothing is proved; 0: no limit
   std::map<std::string, LinkSettings> links;
   bool against_links = false, against_map = false;
@@ -44,7 +45,8 @@ struct RobotConfig {
 
   double scaleOf(const std::string& link) const;
   double paddingOf(const std::string& link) const;
-  const SpeedBound& speedOr(const SpeedBound& otherwise) const { return speed ? *speed : otherwise; }
+  /// Of each link, where nothing is said of it alone `otherwise`.
+  SpeedBound speedOr(const SpeedBound& otherwise) const;
 };
 
 /// A collision element of a link.

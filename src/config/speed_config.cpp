@@ -35,6 +35,11 @@ void readSpeeds(ParameterReader& reader, MonitorConfig& config) {
 
 void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config) {
   if (!config.speed_law) return;
+  if (config.robot_asked.speed_factor > 0 && !std::isfinite(config.robot_asked.speedOr(config.speed).max_m_s)) {
+    reader.fail("robot/speed_factor",
+                "bounds the robot until the next frame alone, but speed_scale is a share of its full speed: give "
+                "robot/max_speed_m_s, too");
+  }
   if (!anyBounded(config)) {
     reader.fail("speed_scale", "needs a speed bound, without which it is always 0: give max_speed_m_s, or remove it");
   }

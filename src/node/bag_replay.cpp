@@ -419,8 +419,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   run.summary.fixed_frame = run.pipeline.fixedFrame();
   run.summary.effects = run.pipeline.effects().plan();
   run.summary.left_out = run.pipeline.monitor().leftOut();
-  run.summary.promises = run.pipeline.promises().promises();
-  run.summary.promises_broken = run.pipeline.promises().brokenPromises();
+  run.summary.promises = run.pipeline.promises().counts();
   if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();
   return run.summary;
 }

@@ -39,12 +39,12 @@ struct BagReplaySummary {
   std::vector<std::string> complaints;  ///< refused messages, each kind once; maps that are missing or not listened to
   std::vector<std::string> not_looked_at;  ///< a map that is not there, meshes that nobody listens to: a sentence each
   FrameCounters frames;
-  EffectPlan effects;                               ///< at the end
-  std::vector<LeftOutPair> left_out;                ///< at the end
-  std::optional<LookAheadSummary> look_ahead;       ///< where look_ahead_s is above 0
-  std::uint64_t promises = 0, promises_broken = 0;  ///< of safe_until, and those that the next answer showed to be void
-  std::vector<double> promised_s;                   ///< for how long, of each
-  std::string first_broken;                         ///< why the first of these was; empty: there is none
+  EffectPlan effects;                          ///< at the end
+  std::vector<LeftOutPair> left_out;           ///< at the end
+  std::optional<LookAheadSummary> look_ahead;  ///< where look_ahead_s is above 0
+  PromiseCounts promises;                      ///< of safe_until
+  std::vector<double> promised_s;              ///< for how long, of each
+  std::string first_broken;                    ///< why the first that was void was so; empty: there is none
   double duration_s = 0;
 };
 

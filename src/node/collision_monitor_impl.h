@@ -109,6 +109,7 @@ struct CollisionMonitor::Impl {
   void publishOutcome(Outcome& outcome);
   void predict(Outcome& outcome);
   void publishPrediction(const Outcome& prediction);
+  void publishRevoked();
   void publishEffects(const ros::Time& stamp);
   void logEffects();
   void accountDropped();

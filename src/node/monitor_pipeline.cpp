@@ -127,10 +127,12 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
   MonitorOptions options = config_.monitor;
   MarkerConfig markers = config_.markers;
   change(options, markers);
+  const bool expects_others = !(options.detector.expected == config_.monitor.detector.expected);
   effects_.decide(options);
   monitor_->setOptions(options);
   // In place, so that nothing else is written: the threads of topics and maps read the rest of it meanwhile.
   change(config_.monitor, config_.markers);
+  if (expects_others) promises_.revoke("other contacts are expected now");
 }
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
@@ -194,8 +196,7 @@ StatsContext MonitorPipeline::counters() const {
   for (const auto& body : passed_over_) context.markers_passed_over += body.messages;
   context.points_no_measurement = points_no_measurement_;
   context.parameter_hash = config_.hash();
-  context.promises = promises_.promises();
-  context.promises_broken = promises_.brokenPromises();
+  context.promises = promises_.counts();
   return context;
 }
 

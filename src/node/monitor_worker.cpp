@@ -194,6 +194,13 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   carryOut([this] { outputs.publishNothing(pipeline.fixedFrame()); });
 }
 
+/// A promise is latched: nobody is to go on by one that a command made void.
+void CollisionMonitor::Impl::publishRevoked() {
+  const PromiseWatch& promises = pipeline.promises();
+  if (!promises.isRevoked()) return;
+  outputs.publishSafeUntil(toSafeUntil(Outcome(), promises, {}, ros::Time::now(), pipeline.fixedFrame()));
+}
+
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
   EffectTracker& effects = pipeline.effects();
   if (effects.takeNewPlan()) {
@@ -259,6 +266,7 @@ void CollisionMonitor::Impl::work() {
 /// True when more can be done at once.
 bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
   for (const auto& command : commands) carryOut(command);
+  if (!commands.empty()) publishRevoked();
   if (map_publisher_seen) pipeline.expectMap();
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
   pipeline.effects().hearDistances(outputs.wantsDistances());

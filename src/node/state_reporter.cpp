@@ -109,7 +109,12 @@ void StateReporter::tell(const Outcome& outcome, const Statement& statement, con
   // What was answered last stays to be seen; that it is no more proved is said.
   if (!outcome.answered) told_.holds_until = before;
   const bool used_map = outcome.answered && outcome.obstacle && !told_.map_stamp.isZero();
-  liveness_.outcome(outcome.arrival_ns, used_map ? told_.map_age : -1, clock_.now());
+  const std::int64_t now_ns = clock_.now();
+  liveness_.outcome(outcome.arrival_ns, used_map ? told_.map_age : -1, now_ns);
+  if (outcome.answered) {
+    stamp_age_s_ = secondsBetween(outcome.stamp_ns, static_cast<StampNs>(ros::Time::now().toNSec()));
+    told_ns_ = now_ns;
+  }
   say(true);
 }
 
@@ -173,8 +178,8 @@ void StateReporter::say(bool always) {
     kinds.push_back(fault.kind);
     sentences.push_back(std::move(fault.sentence));
   }
-  const bool slowed = law_ && isSlowed(clock_.now());
-  const bool as_slow = std::exchange(slowed_, slowed) == slowed;
+  const std::string slowed = law_ ? whySlowed(clock_.now()) : "";
+  const bool is_slowed = !slowed.empty(), as_slow = std::exchange(slowed_, is_slowed) == is_slowed;
   if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
   Statement statement = answer_;
   statement.assurance.hinder(sentences);
@@ -188,19 +193,19 @@ void StateReporter::say(bool always) {
   clear->data = message->clear;
   clear_.publish(clear);
   state_.publish(message);
-  if (law_) saySpeed(statement.assurance);
+  if (law_) saySpeed(statement.assurance, slowed);
 }
 
-bool StateReporter::isSlowed(std::int64_t now_ns) const {
-  return !(liveness_.answerAge(now_ns) <= law_->reaction_time_s);
+std::string StateReporter::whySlowed(std::int64_t now_ns) const {
+  return whyTooOld(stamp_age_s_ + secondsBetween(told_ns_, now_ns), liveness_.answerAge(now_ns), *law_);
 }
 
-void StateReporter::saySpeed(const Assurance& assurance) {
+void StateReporter::saySpeed(const Assurance& assurance, const std::string& slowed) {
   const auto message = boost::make_shared<deformable_ccd::SpeedScale>(speed_told_);
   if (!assurance.proved) {
     limitSpeed("not proved: " + assurance.missing.front(), *message);
-  } else if (slowed_) {
-    limitSpeed("no newer answer within the reaction time", *message);
+  } else if (!slowed.empty()) {
+    limitSpeed(slowed, *message);
   }
   message->header.stamp = ros::Time::now();
   message->header.frame_id = told_.header.frame_id;

@@ -75,9 +75,9 @@ class StateReporter {
   void voidAnswer(const std::string& reason);
   /// The mutex is held. Publishes what holds now; `always`: also if it is what was said last.
   void say(bool always);
-  /// No newer frame than one that came too long ago has an answer: what slows down would react too late.
-  bool isSlowed(std::int64_t now_ns) const;
-  void saySpeed(const Assurance& assurance);
+  /// Why what slows down would react too late to what the newest answer did not see; empty: it would not.
+  std::string whySlowed(std::int64_t now_ns) const;
+  void saySpeed(const Assurance& assurance, const std::string& slowed);
 
   std::mutex mutex_;
   std::condition_variable ended_;
@@ -88,7 +88,9 @@ class StateReporter {
   Statement answer_;                       // of the last step or what came instead, without what is wrong besides
   deformable_ccd::State told_;             // its other fields
   deformable_ccd::SpeedScale speed_told_;  // of the last step
-  bool slowed_ = false;                    // isSlowed() as it was said last
+  double stamp_age_s_ = 0;                 // of its frame, when it was told
+  std::int64_t told_ns_ = 0;               // when that was, on the watch's clock
+  bool slowed_ = false;                    // by its age, as it was said last
   std::string hint_;
   std::vector<Fault::Kind> hinders_;  // what was said to stand in its way
   bool stopped_ = false;

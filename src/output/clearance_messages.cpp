@@ -111,6 +111,15 @@ deformable_ccd::ClearanceArray toClearanceArray(const Outcome& outcome, const st
 NearestPartners nearestPartners(const Outcome& outcome) {
   NearestPartners nearest{"", NONE, NONE};
   double least_m = std::numeric_limits<double>::infinity(), upper_m = least_m;
+  if (outcome.clearances.empty()) return nearest;
+  // What is inside of another one touches it, however far apart their surfaces are.
+  for (const StartIntersection& start : outcome.intersections) {
+    if (start.expected || start.body[0] == start.body[1] || least_m == 0) continue;
+    least_m = upper_m = 0;
+    std::array<std::uint16_t, 2> both = start.body;
+    std::sort(both.begin(), both.end());
+    nearest = {pairOf(both, outcome.step->bodies), 0, 0};
+  }
   for (const Clearance& clearance : outcome.clearances) {
     if (clearance.expected || clearance.body[0] == clearance.body[1]) continue;
     const ClearanceDistance& distance = clearance.over_step;

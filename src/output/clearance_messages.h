@@ -19,7 +19,8 @@ struct NearestPartners {
   std::string names;                ///< empty: there are none, or nobody asked
   double lower_m = 0, upper_m = 0;  ///< of all such partners; NaN: it is not known
 };
-/// Those of the smallest lower bound; of which nothing is known, where there are such.
+/// Those of the smallest lower bound; of which nothing is known, where there are such. What is inside of another,
+/// closed body is 0 from it, unlike its surface (Clearance).
 NearestPartners nearestPartners(const Outcome& outcome);
 
 }  // namespace dccd

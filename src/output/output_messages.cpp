@@ -278,8 +278,9 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.weld_changes = context.weld_changes;
   fillCounts(outcome, out);
   fillStages(outcome.stats, out);
-  out.promises = context.promises;
-  out.promises_broken = context.promises_broken;
+  out.promises = context.promises.made;
+  out.promises_kept = context.promises.kept;
+  out.promises_broken = context.promises.broken;
   out.map_present = outcome.obstacle != nullptr;
   if (outcome.obstacle) {
     out.map_leaves = outcome.obstacle->leafCount();

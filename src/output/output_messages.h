@@ -13,6 +13,7 @@
 #include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
+#include "dccd/safe_until.h"
 #include "dccd/stream.h"
 #include "output/statement.h"
 #include "report/words.h"
@@ -68,7 +69,7 @@ struct StatsContext {
   std::uint64_t frames_handed_over = 0;   ///< by publishers in the same process, never serialised
   std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;
-  std::uint64_t promises = 0, promises_broken = 0;  ///< of ~safe_until, since the start
+  PromiseCounts promises;  ///< of ~safe_until, since the start
 };
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,

@@ -20,6 +20,7 @@ std::string assumedOf(const Body& body, const SpeedBound& bound) {
   if (bound.last_step_factor > 0) {
     text << "no vertex of '" << body.name << "' is faster than " << bound.last_step_factor
          << " times its fastest in this step";
+    if (std::isfinite(bound.max_m_s)) text << ", nor than " << bound.max_m_s << " m/s";
   } else if (bound.max_m_s == 0) {
     text << "'" << body.name << "' stands still";
   } else if (std::isfinite(bound.max_m_s)) {
@@ -92,6 +93,16 @@ deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vecto
   out.needed = speed.needed_m;
   if (outcome.answered) out.holds_until = toRosTime(outcome.stamp_ns);
   return out;
+}
+
+std::string whyTooOld(double since_stamp_s, double since_arrival_s, const SpeedLaw& law) {
+  if (std::max(since_stamp_s, since_arrival_s) <= law.reaction_time_s) return "";
+  const double offset_s = since_stamp_s - since_arrival_s;
+  if (!(offset_s > law.reaction_time_s)) return "no newer answer within the reaction time";
+  std::ostringstream text;
+  text << "the newest frame came " << offset_s << " s after its stamp, which alone is more than the reaction time of "
+       << law.reaction_time_s << " s: the clock of the stamps and the monitor's (ros::Time) differ, or frames are late";
+  return text.str();
 }
 
 void limitSpeed(const std::string& reason, deformable_ccd::SpeedScale& message) {

@@ -18,6 +18,9 @@ deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch
 /// What the distances allow; whether all else is proved is said by limitSpeed().
 deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
                                         const SpeedLaw& law, const std::string& frame);
+/// Why the newest answer is too old for the law, which counts from its frame's stamp, but at least from its arrival; so
+/// long ago were the two [s]. Empty: it is not.
+std::string whyTooOld(double since_stamp_s, double since_arrival_s, const SpeedLaw& law);
 /// 0 for this reason.
 void limitSpeed(const std::string& reason, deformable_ccd::SpeedScale& message);
 

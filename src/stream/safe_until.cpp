@@ -3,6 +3,7 @@
 #include <gmpxx.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <sstream>
@@ -69,7 +70,7 @@ std::string pairOf(const Outcome& outcome, const Clearance& pair) {
   return nameOf(outcome, pair.body[0]) + " and " + (isItself(pair) ? "itself" : nameOf(outcome, pair.body[1]));
 }
 
-/// By body of the step, with what its last step says put in.
+/// By body of the step.
 std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given) {
   std::vector<SpeedBound> bounds = given;
   bounds.resize(outcome.step ? outcome.step->bodies.size() : 0);
@@ -83,9 +84,18 @@ std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<Speed
     };
     require(bounds[b].max_m_s, "max_m_s");
     require(bounds[b].last_step_factor, "last_step_factor");
-    if (bounds[b].last_step_factor > 0) {
-      bounds[b].max_m_s = bounds[b].last_step_factor * fastestOf(outcome.step->bodies[b], outcome.duration_s());
-    }
+  }
+  return bounds;
+}
+
+/// The same until the next frame: with what the last step says put in.
+std::vector<SpeedBound> boundsAfter(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+  std::vector<SpeedBound> bounds = boundsOf(outcome, given);
+  for (std::size_t b = 0; b < bounds.size(); ++b) {
+    SpeedBound& bound = bounds[b];
+    if (!(bound.last_step_factor > 0)) continue;
+    bound.max_m_s =
+        std::min(bound.max_m_s, bound.last_step_factor * fastestOf(outcome.step->bodies[b], outcome.duration_s()));
   }
   return bounds;
 }
@@ -106,10 +116,52 @@ bool counts(const Outcome& outcome, const Clearance& pair) {
   return !pair.expected && !mapless;
 }
 
+/// Of which two bodies one may be inside of the other at a step's end, where that is not expected: how far their
+/// surfaces are says nothing of them. Surfaces that do not meet in all of the step carry nothing into each other, so
+/// that what is inside at its end was so when it began.
+class Insides {
+ public:
+  explicit Insides(const Outcome& outcome) : outcome_(outcome) {
+    for (const StartIntersection& start : outcome.intersections) {
+      if (!start.expected && start.body[1] != OBSTACLE_BODY) known_.push_back(start.body);
+    }
+    std::sort(known_.begin(), known_.end());
+    known_.erase(std::unique(known_.begin(), known_.end()), known_.end());
+    if (outcome.start_state_complete) return;
+    for (const Body& body : outcome.step->bodies) {
+      Eigen::AlignedBox3d& box = boxes_.emplace_back();
+      for (const Vec3& position : *body.t0) box.extend(position);
+    }
+  }
+
+  /// Why the two may be; empty: they are not. The map is solid: it has distances inside, too.
+  std::string why(const Clearance& pair) const {
+    const auto [a, b] = pair.body;
+    if (a == b || b == OBSTACLE_BODY) return "";
+    if (isKnown(a, b) || isKnown(b, a)) {
+      const std::uint16_t inner = isKnown(a, b) ? a : b, outer = inner == a ? b : a;
+      return nameOf(outcome_, inner) + " is inside of " + nameOf(outcome_, outer) + ", or crosses it";
+    }
+    if (!(pair.over_step.lower_m > 0)) return pairOf(outcome_, pair) + " may have met in this step";
+    if (boxes_.empty() || !boxes_[a].intersects(boxes_[b])) return "";
+    return "it is not known whether one of " + pairOf(outcome_, pair) + " is inside of the other";
+  }
+  bool hold(const Clearance& pair) const { return !why(pair).empty(); }
+
+ private:
+  bool isKnown(std::uint16_t inner, std::uint16_t outer) const {
+    return std::binary_search(known_.begin(), known_.end(), std::array<std::uint16_t, 2>{inner, outer});
+  }
+  const Outcome& outcome_;
+  std::vector<std::array<std::uint16_t, 2>> known_;  // ascending
+  std::vector<Eigen::AlignedBox3d> boxes_;           // when the step began; empty: all that was inside then is known
+};
+
 /// What is certainly between the two at the step's end until they touch [m]; 0: nothing, or nobody knows.
-double distanceOf(const Outcome& outcome, const Clearance& pair) {
+double distanceOf(const Outcome& outcome, const Insides& insides, const Clearance& pair) {
   const ClearanceStatus status = pair.at_end.status;
   if (status == ClearanceStatus::TOUCHING || status == ClearanceStatus::UNKNOWN) return 0;
+  if (insides.hold(pair)) return 0;
   const std::vector<Body>& bodies = outcome.step->bodies;
   const double separation_m = pair.body[1] == OBSTACLE_BODY ? separationFromMap(bodies[pair.body[0]])
                                                             : separationBetween(bodies[pair.body[0]], pair.body[0],
@@ -121,8 +173,8 @@ double distanceOf(const Outcome& outcome, const Clearance& pair) {
 
 /// Of both partners [m/s]; the map stands still.
 struct Speeds {
-  double slowed = 0, other = 0;
-  std::string unbounded;  // a body of which nobody says how fast it is
+  double slowed = 0, other = 0;  // slowed 0: nothing of the two slows down
+  std::string unbounded;         // a body of which nobody says how fast it is
 };
 Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
   Speeds speeds;
@@ -137,8 +189,9 @@ Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector
 
 std::string unboundedReason(const std::string& body) { return "no speed bound is known of body '" + body + "'"; }
 
-std::string zeroReason(const Outcome& outcome, const Clearance& pair) {
+std::string zeroReason(const Outcome& outcome, const Insides& insides, const Clearance& pair) {
   const bool unknown = pair.at_end.status == ClearanceStatus::UNKNOWN;
+  if (pair.at_end.lower_m > 0 && !unknown && insides.hold(pair)) return insides.why(pair);
   return "the distance of " + pairOf(outcome, pair) + (unknown ? " is not known" : " may be 0");
 }
 
@@ -191,16 +244,17 @@ bool hasNewVoxels(const VoxelSurface& now, const VoxelSurface& before) {
 SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given) {
   SafeUntil result;
   result.stamp_ns = result.until_ns = result.others_until_ns = outcome.stamp_ns;
-  const std::vector<SpeedBound> bounds = boundsOf(outcome, given);
+  const std::vector<SpeedBound> bounds = boundsAfter(outcome, given);
   result.reason = whyNone(outcome);
   if (!result.reason.empty()) return result;
+  const Insides insides(outcome);
   double least_s = MOST_PROMISED_S, others_s = MOST_PROMISED_S;
   bool others = false;
   bool first = true;
   forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
     if (!counts(outcome, pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
-    const double distance_m = distanceOf(outcome, pair);
+    const double distance_m = distanceOf(outcome, insides, pair);
     double closing_m_s = speeds.slowed + speeds.other;
     if (speeds.slowed > 0 && speeds.other > 0) closing_m_s = roundedUp(closing_m_s);
     const bool nothing = distance_m == 0 || !std::isfinite(closing_m_s);
@@ -215,7 +269,7 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
     result.distance_m = distance_m;
     result.closing_m_s = std::isfinite(closing_m_s) ? closing_m_s : std::numeric_limits<double>::quiet_NaN();
     result.reason = !nothing                   ? ""
-                    : speeds.unbounded.empty() ? zeroReason(outcome, pair)
+                    : speeds.unbounded.empty() ? zeroReason(outcome, insides, pair)
                                                : unboundedReason(speeds.unbounded);
   });
   result.until_ns += nsIn(least_s);
@@ -228,6 +282,7 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
   broken_.clear();
   promise_ = safeUntil(outcome, bounds_);
   if (!outcome.answered) return promise_;
+  broken_ = std::exchange(revoked_, {});
   const StampNs time_ns = step_ ? outcome.stamp_ns - step_->stamp_ns : 0;
   if (time_ns > 0) {
     const auto say = [&](const std::string& what) { broken_ += (broken_.empty() ? "" : "; ") + what; };
@@ -252,15 +307,24 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
                       (obstacle_ ? hasNewVoxels(*outcome.obstacle, *obstacle_) : outcome.obstacle->leafCount() > 0);
     if (moved) say("the map is elsewhere");
     if (grew) say("the map has new voxels");
-    broken_promises_ += !broken_.empty();
+    ++(broken_.empty() ? counts_.kept : counts_.broken);
   }
   step_ = nullptr;
   if (!promise_.isPromise()) return promise_;
-  ++promises_;
+  ++counts_.made;
   step_ = outcome.step;
   obstacle_ = outcome.obstacle;
-  assumed_ = boundsOf(outcome, bounds_);
+  assumed_ = boundsAfter(outcome, bounds_);
   return promise_;
+}
+
+void PromiseWatch::revoke(const std::string& why) {
+  if (!step_) return;
+  const StampNs stamp_ns = step_->stamp_ns;
+  forget();
+  promise_.stamp_ns = promise_.until_ns = promise_.others_until_ns = stamp_ns;
+  promise_.reason = broken_ = revoked_ = why;
+  ++counts_.broken;
 }
 
 void PromiseWatch::forget() {
@@ -268,6 +332,7 @@ void PromiseWatch::forget() {
   obstacle_ = nullptr;
   promise_ = {};
   broken_.clear();
+  revoked_.clear();
 }
 
 double separationDistance(double scale, double v_r_m_s, double v_h_m_s, const SpeedLaw& law) {
@@ -299,15 +364,17 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
   require(law.stopping_time_s, "stopping_time_s");
   require(law.uncertainty_m, "uncertainty_m");
   SpeedScale result;
+  // Scale 1 is full speed, whatever was done of late: a factor of the last motion says nothing of what an arm may do.
   const std::vector<SpeedBound> bounds = boundsOf(outcome, given);
   result.reason = whyNone(outcome);
   if (!result.reason.empty()) return result;
   result.scale = 1;
+  const Insides insides(outcome);
   forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
     if (!counts(outcome, pair) || isItself(pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
     if (speeds.slowed == 0) return;
-    const double distance_m = distanceOf(outcome, pair);
+    const double distance_m = distanceOf(outcome, insides, pair);
     const bool bounded = speeds.unbounded.empty();
     const double scale = bounded && distance_m > 0 ? speedScale(distance_m, speeds.slowed, speeds.other, law) : 0;
     if (scale >= result.scale) return;
@@ -321,7 +388,7 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
          << " m are needed at full speed";
     result.reason = !bounded         ? unboundedReason(speeds.unbounded)
                     : distance_m > 0 ? text.str()
-                                     : zeroReason(outcome, pair);
+                                     : zeroReason(outcome, insides, pair);
   });
   if (assuranceOf(outcome).touching == Touching::NEW) {
     result.scale = 0;

@@ -56,6 +56,13 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
         headline = json.loads((self.folder / 'large/report.json').read_text())['headline']
         self.assertRegex(headline, r'TELEPORT: .* m across: are its coordinates in millimetres\?')
 
+    def test_a_promise_that_nobody_looked_at_is_not_kept(self):
+        octomap = ('/octomap_binary', self.octomap(), self.messages[0][2])
+        for frames, said in ((2, '1 promise of .* s in the middle, 0 kept, 0 void, 1 not looked at'),
+                             (3, '2 promises of .* s in the middle, 1 kept, 0 void, 1 not looked at')):
+            bag = self.write('%d.bag' % frames, [octomap] + self.cloths[:frames])
+            self.assertRegex(self.analyzed('promised', bag, *self.params('max_speed_m_s: 5\n'))[1], 'safe until: ' + said)
+
     def test_the_help_lists_the_exit_statuses(self):
         said = self.tool('analyze_bag', '--help').stdout
         for line in ('0', '1', '3'):

@@ -128,6 +128,18 @@ class AnswersTest(PythonTestCase):
                     number += len(truth)
         self.assertGreater(number, 100)
 
+    def test_equal_answers_of_pairs_have_equal_bytes(self):
+        """Also between the fields, and whatever the memory held before."""
+        t0, t1 = (np.random.default_rng(seed).normal(size=(500, 4, 3)) for seed in (1, 2))
+        answers = []
+        for filled in (0, 255):
+            before = [np.full(500 * 24, filled, 'u1') for _ in range(8)]
+            del before
+            answers.append(dccd.pairs('VF', t0, t1))
+        self.assertEqual(answers[0].dtype.itemsize, 24)
+        self.assertEqual(answers[0].tobytes(), answers[1].tobytes())
+        self.assertFalse(answers[1].view('u1').reshape(500, 24)[:, 18:].any())
+
     def test_what_can_be_worked_out(self):
         outcome = dccd.detect(dccd.Body(*two_triangles(), FACES, name='both'))
         self.assertEqual(outcome.contacts['kind'].tolist(), [dccd.VERTEX_FACE] * 3)

@@ -215,7 +215,7 @@ class ReportPageTest(FolderTestCase):
         self.assertRegex(drawn, r'<polyline [^>]*stroke-dasharray="none"[^>]*><title>cloth with octomap')
         self.assertIn('distance [m]', drawn)
         self.assertRegex(body, r'id="clearance_note">[^<]*lower bound.*cloth with octomap')
-        self.assertRegex(body, r'id="promises">safe until: \d+ promises of [\d.]+ s in the middle, \d+ kept, \d+ void')
+        self.assertRegex(body, r'id="promises">safe until: \d+ promises of [\d.]+ s in the middle, \d+ kept, \d+ void, \d+ not looked at')
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_own_voxels(self):

@@ -69,14 +69,14 @@ class PromisedTest(unittest.TestCase):
     """The line of the promises of ~safe_until."""
 
     def test_for_how_long_and_whether_they_were_kept(self):
-        promised, stats = runpy.run_path(str(WATCH))['promised'], StepStats(promises=92, promises_broken=5)
+        promised, stats = runpy.run_path(str(WATCH))['promised'], StepStats(promises=92, promises_kept=86, promises_broken=5)
         promise = SafeUntil(seconds=0.14, bodies=['cloth', 'octomap'])
-        self.assertEqual(promised(promise, stats), '140 ms from the frame on, by cloth and octomap; 87 kept, 5 void')
+        self.assertEqual(promised(promise, stats), '140 ms from the frame on, by cloth and octomap; 86 kept, 5 void, 1 not looked at')
         promise = SafeUntil(reason='something touches', broken="body 'cloth' was faster than 1 m/s")
         self.assertEqual(promised(promise, stats),
-                         "no promise: something touches; 87 kept, 5 void; body 'cloth' was faster than 1 m/s")
+                         "no promise: something touches; 86 kept, 5 void, 1 not looked at; body 'cloth' was faster than 1 m/s")
         promise = SafeUntil(seconds=2, bodies=['', ''])
-        self.assertEqual(promised(promise, stats), '2.0 s from the frame on; 87 kept, 5 void', 'no pair limits it')
+        self.assertEqual(promised(promise, stats), '2.0 s from the frame on; 86 kept, 5 void, 1 not looked at', 'no pair limits it')
 
 
 class WatchTest(unittest.TestCase):

@@ -216,18 +216,21 @@ TEST(AdversaryProperty, NoMotionWithinTheBoundsTouchesBeforeTheCertificate) {
   RecordProperty("at least half of the true time", static_cast<int>(half));
 }
 
+constexpr SpeedLaw LAW{ClosedLoop::REACTION_S, ClosedLoop::FULL_SPEED_M_S / (0.8 * ClosedLoop::BRAKING_M_S2), 0.02};
+
 TEST(ClosedLoopProperty, AnArmThatSlowsDownTouchesNothingAndIsFasterThanAThreshold) {
   const std::uint64_t seeds = longRun() ? 1000 : 10;
-  const SpeedLaw law{ClosedLoop::REACTION_S, ClosedLoop::FULL_SPEED_M_S / (0.8 * ClosedLoop::BRAKING_M_S2), 0.02};
   double ours_m_s = 0, threshold_m_s = 0;
   for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
-    const ClosedLoopRun ours = runClosedLoop(
-        seed, [&](const Outcome& outcome) { return speedScale(outcome, {{ClosedLoop::CLOTH_SPEED_M_S}}, law).scale; });
+    const ClosedLoopRun ours = runClosedLoop(seed, ArmManner::STEADY, [&](const Outcome& outcome) {
+      return speedScale(outcome, {{ClosedLoop::CLOTH_SPEED_M_S}}, LAW).scale;
+    });
     EXPECT_FALSE(ours.contact) << seed;
     EXPECT_TRUE(ours.arrived) << seed;
+    EXPECT_LE(ours.fastest_m_s, ClosedLoop::CLOTH_SPEED_M_S) << seed << ": the law rests on that";
     ours_m_s += ours.mean_speed_m_s;
     // Thresholds with which the cloth touches nothing, either; nearer or faster ones touch (doc/slow_down.md).
-    const ClosedLoopRun threshold = runClosedLoop(seed, [](const Outcome& outcome) {
+    const ClosedLoopRun threshold = runClosedLoop(seed, ArmManner::STEADY, [](const Outcome& outcome) {
       const double d = distanceToMap(outcome);
       return d > 0.2 ? 1 : d > 0.03 ? 0.1 : 0;
     });
@@ -237,10 +240,27 @@ TEST(ClosedLoopProperty, AnArmThatSlowsDownTouchesNothingAndIsFasterThanAThresho
   EXPECT_GT(ours_m_s, threshold_m_s);
 }
 
+// Before the wall it creeps, rests and sets off again. What it did of late allows nothing: the scale is a share of its
+// full speed, also where a factor of the last motion is known.
+TEST(ClosedLoopProperty, AnArmThatCreepsRestsAndSetsOffAgainTouchesNothing) {
+  const std::uint64_t seeds = longRun() ? 1000 : 20;
+  int restarts = 0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const ClosedLoopRun run = runClosedLoop(seed, ArmManner::RESTARTING, [&](const Outcome& outcome) {
+      return speedScale(outcome, {{ClosedLoop::CLOTH_SPEED_M_S, 3}}, LAW).scale;
+    });
+    EXPECT_FALSE(run.contact) << seed;
+    EXPECT_TRUE(run.arrived) << seed;
+    EXPECT_LE(run.fastest_m_s, ClosedLoop::CLOTH_SPEED_M_S) << seed << ": the law rests on that";
+    restarts += run.restarts;
+  }
+  EXPECT_GT(restarts, 2 * static_cast<int>(seeds));
+}
+
 TEST(ClosedLoopProperty, AnArmThatDoesNotSlowDownTouches) {
   int contacts = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    contacts += runClosedLoop(seed, [](const Outcome&) { return 1; }).contact;
+    contacts += runClosedLoop(seed, ArmManner::STEADY, [](const Outcome&) { return 1; }).contact;
   }
   EXPECT_GT(contacts, 0) << "or the loop would judge nothing";
 }

@@ -3,7 +3,9 @@
 #include <deformable_ccd/DetachObject.h>
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/RemoveObject.h>
+#include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SetHold.h>
+#include <deformable_ccd/SetPhase.h>
 #include <deformable_ccd/State.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <dynamic_reconfigure/Reconfigure.h>
@@ -32,6 +34,7 @@ struct WithRobot : MonitorTest {
   ros::Publisher mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, name_ + "/mesh");
   Probe<State> state{node, name_ + "/state"};
   Probe<deformable_ccd::FirstContact> first{node, name_ + "/first_contact"};
+  Probe<deformable_ccd::SafeUntil> promises{node, name_ + "/safe_until"};
 
   Probe<tf2_msgs::TFMessage> tf{node, "/tf"};
 
@@ -56,6 +59,17 @@ struct WithRobot : MonitorTest {
       return said.holds_until == ros::Time(stamp_s);
     }));
     return said;
+  }
+  /// What ~safe_until says of that step.
+  deformable_ccd::SafeUntil promisedAt(double stamp_s) {
+    EXPECT_TRUE(waitUntil([&] { return promises.count() > 0 && promises.last().header.stamp == ros::Time(stamp_s); }));
+    return promises.last();
+  }
+  /// The promise that is latched is void for this reason, though no step has come.
+  void expectRevoked(const std::string& why) {
+    EXPECT_TRUE(waitUntil([&] { return promises.last().reason == why; })) << promises.last().reason;
+    EXPECT_EQ(promises.last().seconds, 0) << why;
+    EXPECT_EQ(promises.last().until, promises.last().header.stamp) << why;
   }
 };
 
@@ -115,7 +129,9 @@ TEST_F(Held, WhatIsAttachedGoesWithTheLinkUntilItIsLetGo) {
   for (int i = 0; i < 5; ++i) lift(130 + 0.1 * i, 0.1);
   send(mesh, meshStamped(tipAbove(0.5), 130));
   EXPECT_TRUE(moveTo(0.5, 130.1).clear);
+  EXPECT_GT(promisedAt(130.1).seconds, 0);
   ASSERT_TRUE(called("/held/attach", rod()).success);
+  expectRevoked("object 'rod' was attached");
   EXPECT_TRUE(waitUntil([&] { return !state.last().proved; })) << "no step was answered with it";
   EXPECT_NE(state.last().reason.find("'rod' was attached"), std::string::npos) << state.last().reason;
   const State met = moveTo(0.29, 130.2);
@@ -129,7 +145,10 @@ TEST_F(Held, WhatIsAttachedGoesWithTheLinkUntilItIsLetGo) {
   EXPECT_FALSE(moveTo(0.5, 130.3).clear) << "on its way back through it";
   deformable_ccd::DetachObject let_go;
   let_go.request.name = "rod";
+  EXPECT_TRUE(moveTo(0.5, 130.35).clear);
+  EXPECT_GT(promisedAt(130.35).seconds, 0);
   ASSERT_TRUE(called("/held/detach", let_go).success);
+  expectRevoked("object 'rod' was detached");
   EXPECT_TRUE(moveTo(0.5, 130.4).clear);
   lift(130.5, 0.3);
   lift(130.6, 0.3);
@@ -137,7 +156,9 @@ TEST_F(Held, WhatIsAttachedGoesWithTheLinkUntilItIsLetGo) {
   EXPECT_TRUE(moveTo(0.31, 130.6).clear) << "just above the disc";
   deformable_ccd::RemoveObject remove;
   remove.request.name = "rod";
+  EXPECT_GT(promisedAt(130.6).seconds, 0);
   ASSERT_TRUE(called("/held/remove", remove).success);
+  expectRevoked("object 'rod' was removed");
   lift(130.7, 0.1);
   lift(130.8, 0.1);
   EXPECT_TRUE(moveTo(0.31, 130.7).clear);
@@ -261,16 +282,43 @@ struct Changing : WithRobot {
 
 TEST_F(Changing, WhatTheHandHoldsIsExpectedUntilItIsSaidToBeOpen) {
   EXPECT_EQ(moveTo(0.05, begin_s + 0.1).touching, State::EXPECTED);
+  EXPECT_EQ(promisedAt(begin_s + 0.1).seconds, 10) << "nothing else is near";
   deformable_ccd::SetHold open;
   const auto said = called("/changing/set_hold", open);
   EXPECT_TRUE(said.success) << said.message;
-  EXPECT_EQ(moveTo(0.06, begin_s + 0.2).touching, State::NEW) << "what touches since before";
+  expectRevoked("other contacts are expected now");
+  const State opened = moveTo(0.06, begin_s + 0.2);
+  EXPECT_EQ(opened.touching, State::NEW) << "what touches since before";
+  EXPECT_NE(opened.reason.find("the promise of ~safe_until was void: other contacts are expected now"),
+            std::string::npos)
+      << opened.reason;
+  EXPECT_EQ(promisedAt(begin_s + 0.2).broken, "other contacts are expected now");
   open.request.body = "cloth";
   EXPECT_FALSE(called("/changing/set_hold", open).success);
   open.request.body = "mesh";
   open.request.holds = true;
   EXPECT_NE(called("/changing/set_hold", open).message.find("mesh with plate"), std::string::npos);
   EXPECT_EQ(moveTo(0.05, begin_s + 0.3).touching, State::EXPECTED);
+}
+
+TEST_F(Changing, APhaseThatEndsTakesThePromiseWithIt) {
+  deformable_ccd::SetHold open;
+  EXPECT_TRUE(called("/changing/set_hold", open).success);
+  deformable_ccd::SetPhase phase;
+  phase.request.phase = "press";
+  EXPECT_TRUE(called("/changing/set_phase", phase).success);
+  EXPECT_EQ(moveTo(0.05, begin_s + 0.1).touching, State::EXPECTED);
+  EXPECT_EQ(promisedAt(begin_s + 0.1).seconds, 10);
+  const std::uint64_t broken = stats.after(0).promises_broken;
+  phase.request.phase = "";
+  EXPECT_TRUE(called("/changing/set_phase", phase).success);
+  expectRevoked("other contacts are expected now");
+  EXPECT_EQ(moveTo(0.06, begin_s + 0.2).touching, State::NEW);
+  EXPECT_EQ(promisedAt(begin_s + 0.2).broken, "other contacts are expected now");
+  EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(begin_s + 0.2); }));
+  EXPECT_EQ(stats.last().promises_broken, broken + 1);
+  open.request.holds = true;
+  EXPECT_TRUE(called("/changing/set_hold", open).success);
 }
 
 TEST_F(Changing, ADescriptionThatChangesIsNotVouchedForUntilItIsBack) {

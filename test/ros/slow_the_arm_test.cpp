@@ -82,11 +82,12 @@ TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
   Probe<deformable_ccd::StepStats> stats(node, name + "/stats");
   const auto floor = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/floor", true);
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tip");
-  floor.publish(meshStamped({{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{0, 1, 2}}}, 1000));
+  // The tracker's clock is 5 s behind.
+  double stamp_s = ros::Time::now().toSec() - 5;
+  floor.publish(meshStamped({{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{0, 1, 2}}}, stamp_s));
   EXPECT_EQ(scales.after(0).scale, 0) << "latched, before the first frame";
   EXPECT_FALSE(scales.last().reason.empty());
   // A tip of at most 0.5 m/s above a floor. At full speed S_p is 0.5 (0.4 + 0.2 / 2) + 0.02 m.
-  double stamp_s = 1000;
   const auto send = [&](double height) {
     const std::size_t seen = promises.count(), said = stats.count();
     publisher.publish(
@@ -105,6 +106,17 @@ TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
     }));
     return first;
   };
+  send(0.45);
+  const auto old = send(0.45);
+  EXPECT_EQ(old.reason, "");
+  EXPECT_LT(old.left, -3) << "the promise is over";
+  EXPECT_EQ(scaleOf(old).scale, 0);
+  const std::string clocks = scaleOf(old).reason;
+  EXPECT_NE(clocks.find("after its stamp, which alone is more than the reaction time of 0.4 s: the clock of the stamps "
+                        "and the monitor's (ros::Time) differ"),
+            std::string::npos)
+      << clocks;
+  stamp_s += 5;
   send(0.45);
   const auto far = send(0.45);
   EXPECT_EQ(far.reason, "");
@@ -131,8 +143,9 @@ TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
     });
   })) << "of this step all is known, "
       << states.last().reason;
-  EXPECT_EQ(stats.last().promises, 3u) << "the first frame has no answer";
-  EXPECT_EQ(stats.last().promises_broken, 1u);
+  EXPECT_EQ(stats.last().promises, 4u) << "the first frame has no answer, nor the one after the clock was set";
+  EXPECT_EQ(stats.last().promises_kept, 2u);
+  EXPECT_EQ(stats.last().promises_broken, 1u) << "and the last one nobody has looked at";
   const auto slow = scaleOf(fast);
   EXPECT_LT(slow.scale, 1);
   EXPECT_GT(slow.scale, 0.5);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <deque>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "dccd/detect.h"
@@ -63,6 +64,27 @@ class Cloth {
   Positions now_, before_;
 };
 
+/// What the arm wants by itself, as a share of full speed.
+class Wish {
+ public:
+  Wish(std::uint64_t seed, ArmManner manner) : manner_(manner), random_(~seed) {}
+  double at(double now_s) {
+    if (manner_ == ArmManner::STEADY || now_s < until_s_) return share_;
+    until_s_ = now_s + uniform(random_, 0.1, 1.5);
+    const double kind = uniform(random_, 0, 1), before = std::exchange(share_, 1);
+    if (kind < 0.6) share_ = kind < 0.25 ? 0 : uniform(random_, 0.002, 0.05);
+    restarts_ += before < 1 && share_ == 1;
+    return share_;
+  }
+  int restarts() const { return restarts_; }
+
+ private:
+  ArmManner manner_;
+  std::mt19937_64 random_;  // its own: what else happens in a run is the same in every manner
+  double share_ = 1, until_s_ = 0;
+  int restarts_ = 0;
+};
+
 std::uint16_t keyOf(double x) { return static_cast<std::uint16_t>(std::lround(x / VOXEL_M) + 32768); }
 
 void addBox(const Vec3& low, const Vec3& high, std::vector<OccupiedLeaf>& leaves) {
@@ -83,7 +105,7 @@ double distanceToMap(const Outcome& outcome) {
   return std::isfinite(least_m) ? least_m : 0;
 }
 
-ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const Outcome&)>& scale) {
+ClosedLoopRun runClosedLoop(std::uint64_t seed, ArmManner manner, const std::function<double(const Outcome&)>& scale) {
   using Loop = ClosedLoop;
   std::mt19937_64 random(seed);
   const double post_m = 0.025 * std::floor(uniform(random, 8, 20)), top_m = 0.025 * std::floor(uniform(random, 4, 16)),
@@ -108,15 +130,18 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const
     step.bodies = {body};
     return detect(step, how, from_history);
   };
+  const auto stampOf = [](double at_s) { return static_cast<StampNs>(std::llround(at_s * 1e9)); };
 
   Cloth cloth(0, top_m + clears_m + HANGS_M);
-  Positions frame = cloth.positions(), checked = frame;
+  Positions frame = cloth.positions(), checked = frame, now = frame;  // the last answered, checked, and due one
   struct Command {
     double at_s, scale, stamp_s;
   };
   std::deque<Command> on_the_way;
   double gripper_m = 0, speed_m_s = 0, wanted = 0, gust_m_s2 = 0, answered_s = 0, near_m = 0, end_s = Loop::LONGEST_S;
   double followed_s = 0;  // stamp of the frame that `wanted` is of
+  Wish wish(seed, manner);
+  const double picks_up_m_s2 = manner == ArmManner::STEADY ? Loop::PICKS_UP_M_S2 : Loop::JERKS_M_S2;
   ClosedLoopRun run;
   int tick = 0;
   for (double now_s = 0; now_s < end_s && !run.contact; now_s = ++tick * TICK_S) {
@@ -127,9 +152,9 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const
     }
     // The arm knows nothing of the wall.
     const bool late = now_s - answered_s > Loop::REACTION_S;
-    const double target_m_s = late ? 0 : wanted * Loop::FULL_SPEED_M_S;
+    const double target_m_s = (late ? 0 : std::min(wanted, wish.at(now_s))) * Loop::FULL_SPEED_M_S;
     if (!late && wanted > 0) run.oldest_s = std::max(run.oldest_s, now_s - followed_s);
-    speed_m_s = std::clamp(target_m_s, speed_m_s - braking_m_s2 * TICK_S, speed_m_s + 1.0 * TICK_S);
+    speed_m_s = std::clamp(target_m_s, speed_m_s - braking_m_s2 * TICK_S, speed_m_s + picks_up_m_s2 * TICK_S);
     gripper_m += speed_m_s * TICK_S;
     gust_m_s2 = std::clamp(gust_m_s2 + uniform(random, -0.02, 0.02) * gusts_m_s2, -gusts_m_s2, gusts_m_s2);
     cloth.tick(speed_m_s * TICK_S, gust_m_s2);
@@ -149,7 +174,13 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const
       checked = cloth.positions();
     }
     if (tick % TICKS_A_FRAME != 0) continue;
+    for (std::size_t v = 0; v < now.size(); ++v) {
+      run.fastest_m_s = std::max(run.fastest_m_s, (cloth.positions()[v] - now[v]).norm() / Loop::FRAME_S);
+    }
+    now = cloth.positions();
     if (uniform(random, 0, 1) < Loop::LOST_SHARE) continue;
+    step.start_ns = stampOf(answered_s);
+    step.stamp_ns = stampOf(now_s);
     const Outcome seen = answer(frame, cloth.positions(), options, history);
     frame = cloth.positions();
     near_m = distanceToMap(seen);
@@ -158,6 +189,7 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const
     const double at_s = now_s + uniform(random, 0.03, Loop::MOST_LATENCY_S);
     on_the_way.push_back({on_the_way.empty() ? at_s : std::max(at_s, on_the_way.back().at_s), scale(seen), now_s});
   }
+  run.restarts = wish.restarts();
   if (!run.arrived) run.mean_speed_m_s = gripper_m / (tick * TICK_S);
   return run;
 }

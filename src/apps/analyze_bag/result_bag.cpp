@@ -105,7 +105,13 @@ void ResultBag::addPromise(const Outcome& outcome, const MonitorPipeline& pipeli
   if (config.promises()) write("safe_until", at, toSafeUntil(outcome, pipeline.promises(), bounds, at, frame));
   if (!config.speed_law) return;
   deformable_ccd::SpeedScale speed = toSpeedScale(outcome, bounds, *config.speed_law, frame);
-  if (!proved) limitSpeed("not proved", speed);
+  const std::string too_old =
+      whyTooOld(secondsBetween(outcome.stamp_ns, static_cast<StampNs>(at.toNSec())), 0, *config.speed_law);
+  if (!proved) {
+    limitSpeed("not proved", speed);
+  } else if (!too_old.empty()) {
+    limitSpeed(too_old, speed);
+  }
   speed.header.stamp = at;
   write("speed_scale", at, speed);
   std_msgs::Float64 value;

@@ -65,6 +65,23 @@ Outcome fingerOverCloth() {
   return outcome;
 }
 
+TEST(NearestPartners, AreThoseOfWhichOneIsInsideOfTheOther) {
+  Outcome outcome = fingerOverCloth();
+  outcome.clearances[0].expected = false;
+  EXPECT_EQ(nearestPartners(outcome).lower_m, 0.99995);
+  outcome.intersections = {{{1, 0}, {3, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX}, true}};
+  EXPECT_EQ(nearestPartners(outcome).lower_m, 0.99995) << "it is expected";
+  outcome.intersections[0].expected = false;
+  const NearestPartners nearest = nearestPartners(outcome);
+  EXPECT_EQ(nearest.lower_m, 0);
+  EXPECT_EQ(nearest.upper_m, 0);
+  EXPECT_EQ(nearest.names, "cloth and finger");
+  outcome.clearances[0].over_step.status = ClearanceStatus::UNKNOWN;
+  EXPECT_TRUE(std::isnan(nearestPartners(outcome).lower_m)) << "what is not known comes first";
+  outcome.clearances.clear();
+  EXPECT_TRUE(std::isnan(nearestPartners(outcome).upper_m)) << "nobody asked";
+}
+
 TEST(ClearanceRow, SaysWhoHowFarWhereAndHowFastTheyClose) {
   const Outcome outcome = fingerOverCloth();
   const auto array = toClearanceArray(outcome, outcome.step->bodies, "world");

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "oracle/algebraic.h"
+#include "support/closed_meshes.h"
 #include "support/said.h"
 #include "unit/stream/monitor_support.h"
 
@@ -216,6 +217,58 @@ TEST(SafeUntil, ALinkIsAssumedToBeSoManyTimesAsFastAsInTheStep) {
     step.bodies[1].t0 = share(before);
   });
   EXPECT_NEAR(safeUntil(outcome, {{0}, {NONE, 3}}).seconds(), 1, 1e-6);
+  EXPECT_NEAR(safeUntil(outcome, {{0}, {0.5, 3}}).seconds(), 1.2, 1e-6) << "nor faster than it can be";
+  EXPECT_NEAR(safeUntil(outcome, {{0}, {0.7, 3}}).seconds(), 1, 1e-6);
+}
+
+// A hand in a box, away from its faces: how far the surfaces are is no distance of the two.
+TEST(SafeUntil, WhatIsInsideOfAnotherBodyTouchesIt) {
+  TestStep scene;
+  scene.bodies = {box({-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}), box({-1, -1, -1}, {1, 1, 1})};
+  const std::vector<SpeedBound> bounds{{0.5}, {0.5}};
+  const SpeedLaw law{0.1, 0.2, 0.02};
+  Options options;
+  options.clearance.wanted = true;
+  const auto look = [&] { return runOnce(scene, options); };
+  const Outcome inside = look();
+  EXPECT_EQ(inside.touching, Touching::LASTING);
+  EXPECT_TRUE(assuranceOf(inside).proved);
+  ASSERT_EQ(inside.clearances.size(), 1u);
+  EXPECT_GT(inside.clearances[0].at_end.lower_m, 0.4) << "of the surfaces: at most max_m is looked for";
+  const SafeUntil promise = safeUntil(inside, bounds);
+  EXPECT_FALSE(promise.isPromise()) << promise.seconds();
+  EXPECT_EQ(promise.distance_m, 0);
+  EXPECT_EQ(promise.reason, "'body_0' is inside of 'body_1', or crosses it");
+  const SpeedScale scale = speedScale(inside, bounds, law);
+  EXPECT_EQ(scale.scale, 0);
+  EXPECT_EQ(scale.reason, promise.reason);
+  scene.bodies[1].shell = true;
+  EXPECT_TRUE(safeUntil(look(), bounds).isPromise()) << "it is a container";
+  EXPECT_EQ(speedScale(look(), bounds, law).scale, 1);
+  scene.bodies[1].shell = false;
+  options.expected.resize(1);
+  options.expected[0].partners[1].body = 1;
+  EXPECT_TRUE(safeUntil(look(), bounds).isPromise()) << "it is expected";
+  EXPECT_EQ(speedScale(look(), bounds, law).scale, 1);
+  options.expected.clear();
+  // It goes in within one step, and is away from all faces at the end of it.
+  for (Vec3& p : scene.bodies[0].t0) p.x() -= 3;
+  const Outcome entered = look();
+  EXPECT_EQ(entered.touching, Touching::NEW);
+  EXPECT_GT(entered.clearances[0].at_end.lower_m, 0.4);
+  EXPECT_FALSE(safeUntil(entered, bounds).isPromise());
+  EXPECT_EQ(safeUntil(entered, bounds).reason, "'body_0' and 'body_1' may have met in this step");
+}
+
+TEST(SafeUntil, WhatMayBeInsideForWantOfTimeIsNoPromise) {
+  Outcome cut = answered({between(0, 1, apart(0.25, ClearanceStatus::LOWER))});
+  cut.status = StepStatus::DEADLINE;
+  cut.unproved = {"the step budget ran out"};
+  cut.start_state_complete = false;
+  EXPECT_TRUE(safeUntil(cut, {{1}, {0}}).isPromise()) << "one above the other: the boxes around them do not meet";
+  cut = changed(cut, [](Step& step) { step.bodies[1] = placed("tip", tip(1000 * MS, -0.5)); });
+  EXPECT_EQ(safeUntil(cut, {{1}, {0}}).reason,
+            "it is not known whether one of 'floor' and 'tip' is inside of the other");
 }
 
 TEST(SafeUntil, RefusesSpeedsThatAreNone) {
@@ -257,8 +310,10 @@ TEST(PromiseWatch, SeesABodyThatWasFasterByOneBit) {
     EXPECT_EQ(watch.broken(), "");
     watch.follow(later(first, seconds_ns, {0, 0, way_m}));
     EXPECT_EQ(watch.broken().empty(), kept) << way_m << ": " << watch.broken();
-    EXPECT_EQ(watch.promises(), 2u);
-    EXPECT_EQ(watch.brokenPromises(), kept ? 0u : 1u);
+    EXPECT_EQ(watch.counts().made, 2u);
+    EXPECT_EQ(watch.counts().kept, kept ? 1u : 0u);
+    EXPECT_EQ(watch.counts().broken, kept ? 0u : 1u);
+    EXPECT_EQ(watch.counts().unseen(), 1u) << "the next answer has not come";
   }
 }
 
@@ -293,6 +348,42 @@ TEST(PromiseWatch, HoldsAPromiseUntilTheNextAnswerWhateverIsLostBetween) {
   watch.forget();
   watch.follow(later(first, 200 * MS, {0, 0, 0.11}));
   EXPECT_EQ(watch.broken(), "") << "after a reset nobody looks back";
+  EXPECT_EQ(watch.counts().made, 4u);
+  EXPECT_EQ(watch.counts().kept, 0u) << "what nobody has looked at is not kept";
+  EXPECT_EQ(watch.counts().broken, 1u);
+  EXPECT_EQ(watch.counts().unseen(), 3u);
+}
+
+TEST(PromiseWatch, WhatIsRevokedIsVoidAtOnceAndTheNextAnswerSaysSo) {
+  const Outcome first = answered({between(0, 1, apart(1))});
+  PromiseWatch watch;
+  watch.setBounds({{0}, {0.5}});
+  watch.revoke("there is none");
+  EXPECT_EQ(watch.broken() + watch.promise().reason, "");
+  watch.follow(first);
+  ASSERT_TRUE(watch.promise().isPromise());
+  EXPECT_FALSE(watch.isRevoked());
+  watch.revoke("other contacts are expected now");
+  watch.revoke("once more");
+  EXPECT_TRUE(watch.isRevoked());
+  EXPECT_FALSE(watch.promise().isPromise());
+  EXPECT_EQ(watch.promise().stamp_ns, first.stamp_ns);
+  EXPECT_EQ(watch.promise().until_ns, first.stamp_ns);
+  EXPECT_EQ(watch.promise().reason, "other contacts are expected now");
+  EXPECT_EQ(watch.broken(), "other contacts are expected now");
+  EXPECT_EQ(watch.counts().broken, 1u);
+  Outcome lost;
+  lost.stamp_ns = first.stamp_ns + 50 * MS;
+  watch.follow(lost);
+  EXPECT_EQ(watch.broken(), "");
+  const Outcome fast = later(first, 100 * MS, {0, 0, 0.5});
+  watch.follow(fast);
+  EXPECT_EQ(watch.broken(), "other contacts are expected now");
+  EXPECT_EQ(watch.counts().made, 2u);
+  EXPECT_EQ(watch.counts().kept, 0u);
+  EXPECT_EQ(watch.counts().broken, 1u) << "once";
+  watch.follow(later(fast, 100 * MS, Vec3::Zero()));
+  EXPECT_EQ(watch.broken(), "") << "that was of another promise";
 }
 
 TEST(PromiseWatch, AStaticBodyThatMovesAnotherMeshAndLostVertices) {
@@ -406,6 +497,27 @@ TEST(SpeedScale, IsTheLeastOfAllPairsAndSaysWhich) {
   EXPECT_LT(near.scale, 1);
   EXPECT_EQ(near.limiting, 1u);
   EXPECT_EQ(near.reason, "'floor' and 'tip' are 0.3 m apart, and 0.47 m are needed at full speed");
+}
+
+// What an arm did of late says nothing of what it does once it may: it creeps or rests before a wall, and sets off.
+TEST(SpeedScale, IsAShareOfFullSpeedHoweverSlowTheLastStepWas) {
+  const SpeedLaw law{0.3, 0.3, 0.02};
+  for (const double way_m : {0.0, 1e-4, 0.005}) {  // in 0.1 s
+    const Outcome hand = changed(answered({between(1, OBSTACLE_BODY, apart(0.025))}), [&](Step& step) {
+      Positions before = *step.bodies[1].t1;
+      for (Vec3& p : before) p.z() += way_m;
+      step.bodies[1].t0 = share(before);
+    });
+    const SpeedScale scale = speedScale(hand, {{0}, {0.5, 3}}, law);
+    EXPECT_EQ(scale.scale, speedScale(0.025, 0.5, 0, law)) << way_m;
+    EXPECT_LT(scale.scale, 0.05) << way_m;
+    EXPECT_EQ(scale.needed_m, separationDistance(1, 0.5, 0, law));
+    Outcome person = hand;
+    person.clearances = {between(0, 1, apart(0.005))};
+    EXPECT_EQ(speedScale(person, {{1.6, 0, false}, {0.5, 3}}, law).scale, 0) << way_m << ": a person is 5 mm away";
+    EXPECT_EQ(speedScale(hand, {{0}, {NONE, 3}}, law).scale, 0);
+    EXPECT_EQ(speedScale(hand, {{0}, {NONE, 3}}, law).reason, "no speed bound is known of body 'tip'");
+  }
 }
 
 TEST(SpeedScale, IsZeroWhereNothingIsKnownOrSomethingTouchesAnew) {

@@ -192,6 +192,61 @@ TEST(SafeUntilMessage, HasNoNumberWhereNothingIsKnown) {
   EXPECT_TRUE(none.bodies[0].empty() && none.assumed.empty());
 }
 
+TEST(SafeUntilMessage, SaysWhatAFactorOfTheLastMotionRestsOn) {
+  const Outcome outcome = distant(0.3, ClearanceStatus::MEASURED);
+  const auto assumed = [&](const SpeedBound& bound) {
+    return toSafeUntil(outcome, PromiseWatch(), {bound}, ros::Time(1.1), "world").assumed[0];
+  };
+  EXPECT_EQ(assumed({NONE, 3}), "no vertex of 'cloth' is faster than 3 times its fastest in this step");
+  EXPECT_EQ(assumed({0.5, 3}),
+            "no vertex of 'cloth' is faster than 3 times its fastest in this step, nor than 0.5 m/s");
+}
+
+TEST(SpeedScaleMessage, ItsAgeIsThatOfTheStampOrOfTheArrival) {
+  const SpeedLaw law{0.3, 0.2, 0.02};
+  EXPECT_EQ(whyTooOld(0.2, 0.1, law), "");
+  EXPECT_EQ(whyTooOld(-4, 0.1, law), "") << "a stamp that is ahead of time makes nothing young";
+  EXPECT_EQ(whyTooOld(0.2, 0.31, law), "no newer answer within the reaction time");
+  EXPECT_EQ(whyTooOld(0.31, 0.2, law), "no newer answer within the reaction time");
+  EXPECT_EQ(whyTooOld(5.1, 0.1, law),
+            "the newest frame came 5 s after its stamp, which alone is more than the reaction time of 0.3 s: the clock "
+            "of the stamps and the monitor's (ros::Time) differ, or frames are late");
+  EXPECT_NE(whyTooOld(NONE, NONE, law), "");
+  EXPECT_NE(whyTooOld(std::nan(""), 0, law), "");
+}
+
+// What is expected is part of what a promise rests on.
+TEST(PromisesOfAPipeline, AreVoidOnceOtherContactsAreExpected) {
+  Driven cloth(
+      scene("max_speed_m_s: 0.5, expected_contacts: [{between: [mesh, octomap], phase: lay}, "
+            "{between: [mesh, octomap], phase: smooth}], phase: lay"));
+  MonitorPipeline& pipeline = cloth.pipeline;
+  cloth.giveMap(1);
+  cloth.feed(1, 0.01f);
+  cloth.feed(1.1, 0.01f);
+  EXPECT_EQ(pipeline.promises().promise().seconds(), MOST_PROMISED_S) << "touching the table is meant";
+  pipeline.setPhase("lay");
+  EXPECT_TRUE(pipeline.promises().promise().isPromise()) << "nothing has changed";
+  pipeline.setPhase("");
+  EXPECT_TRUE(pipeline.promises().isRevoked());
+  EXPECT_FALSE(pipeline.promises().promise().isPromise());
+  const auto message = toSafeUntil(Outcome(), pipeline.promises(), {}, ros::Time(1.2), pipeline.fixedFrame());
+  EXPECT_EQ(message.header.stamp, ros::Time(1.1));
+  EXPECT_EQ(message.until, message.header.stamp);
+  EXPECT_EQ(message.seconds + message.others_seconds, 0);
+  EXPECT_EQ(message.reason, "other contacts are expected now");
+  EXPECT_EQ(message.broken, message.reason);
+  EXPECT_EQ(pipeline.counters().promises.broken, 1u);
+  cloth.feed(1.2, 0.01f);
+  EXPECT_EQ(pipeline.promises().broken(), message.reason);
+  EXPECT_NE(pipeline.statement().broken.find(message.reason), std::string::npos);
+  EXPECT_EQ(pipeline.counters().promises.made, 2u);
+  EXPECT_EQ(pipeline.counters().promises.kept, 0u);
+  EXPECT_THROW(pipeline.setPhase("fold"), ParameterError);
+  pipeline.reconfigure([](MonitorOptions& options, MarkerConfig&) { options.detector.max_contacts = 5; });
+  EXPECT_TRUE(pipeline.promises().promise().isPromise()) << "it does not rest on what is listed";
+}
+
 TEST(SpeedScaleMessage, IsZeroForAReason) {
   const SpeedLaw law{0.1, 0.2, 0.02};
   auto message = toSpeedScale(distant(3, ClearanceStatus::FARTHER), {{0.5}}, law, "world");

@@ -60,6 +60,29 @@ class Attached : public FolderTest {
   std::unique_ptr<Driven> driven_;
 };
 
+// Which bodies there are, and what carries them, is part of what a promise rests on.
+TEST_F(Attached, APromiseIsVoidOnceSomethingIsTakenLetGoOrForgotten) {
+  start(robotScene("", "effects: {octomap: 'off'}, max_speed_m_s: 5"));
+  feed(1, 0, 0.8f);
+  double stamp_s = 1;
+  const auto expectVoid = [&](const std::string& why, const std::function<void()>& change) {
+    feed(stamp_s += 0.1, 0, 0.8f);
+    ASSERT_TRUE(pipeline().promises().promise().isPromise()) << pipeline().promises().promise().reason;
+    const std::uint64_t broken = pipeline().promises().counts().broken;
+    change();
+    EXPECT_TRUE(pipeline().promises().isRevoked()) << why;
+    EXPECT_EQ(pipeline().promises().promise().reason, why);
+    feed(stamp_s += 0.1, 0, 0.8f);
+    EXPECT_EQ(pipeline().promises().broken(), why);
+    EXPECT_EQ(pipeline().promises().counts().broken, broken + 1);
+  };
+  expectVoid("object 'plate' was attached", [&] { attach(plate()); });
+  expectVoid("object 'plate' was detached", [&] { pipeline().detach("plate"); });
+  expectVoid("object 'plate' was removed", [&] { pipeline().remove("plate"); });
+  expectVoid("parameter d is another one than at the start; restart the monitor, which watches the robot of then",
+             [&] { pipeline().robotChanged({"d"}), pipeline().robotChanged({}); });
+}
+
 TEST_F(Attached, ItMovesWithItsLinkAndStaysWhereItIsLetGo) {
   start(robotScene("", "effects: {octomap: 'off'}, patch_gap_s: 0.0"));  // each touch is news
   feed(1, 0, 0.8f);
