@@ -1,6 +1,7 @@
 // What came and was not used: a step that spans it proves nothing, and says what it was. Stamps are of today.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -193,6 +194,7 @@ TEST(Unused, FramesThatAQueueDropsAreMissedUnlessItIsToThinThemOut) {
     for (int k = 1; k <= 13; ++k) {
       world.move("tip", 0.02 + 0.02 * k);
       world.give(OTHER, 0.02 + 0.02 * k, 1);
+      EXPECT_FALSE(world.pipeline.nextOutcome(PATIENCE_NS, world.outcome)) << "it gets its place";
     }
     InputQueue queue(1, 8, world.config.queue_policy);
     for (int k = 1; k <= 12; ++k) {
@@ -212,8 +214,9 @@ TEST(Unused, FramesThatAQueueDropsAreMissedUnlessItIsToThinThemOut) {
         clear.push_back(said.clear());
         if (clear.size() == 1 && policy == "newest") world.expectUnknown("body 'cloth'", "not used: QUEUE_FULL");
         const bool thinned = policy == "thin" && clear.size() == 1;
-        EXPECT_EQ(said.excluded, thinned ? std::vector<std::string>{"4 frames of body 'cloth' by queue_policy: thin"}
-                                         : std::vector<std::string>{})
+        EXPECT_EQ(
+            std::count(said.excluded.begin(), said.excluded.end(), "4 frames of body 'cloth' by queue_policy: thin"),
+            thinned)
             << policy;
       }
     };
