@@ -442,7 +442,8 @@ TEST(Map, WhoseFrameNobodyTellsOfIsNoClearStep) {
             std::string::npos);
 }
 
-// The cloth's frame is a camera's, from which the fixed frame is learnt, and the table's is at rest; or the table moves.
+// The cloth's frame is a camera's, from which the fixed frame is learnt, and the table's is at rest; or the table
+// moves.
 TEST(StaticBodies, InAFixedFrameThatMovesAreNoClearStep) {
   for (const bool named : {false, true}) {
     const std::string frame = named ? "fixed_frame: world, " : "";
