@@ -89,10 +89,10 @@ std::string promisesInWords(const BagReplaySummary& summary) {
   const PromiseCounts& promises = summary.promises;
   if (promises.made == 0) return "";
   std::ostringstream text;
-  text << "safe until: " << promises.made << (promises.made == 1 ? " promise of " : " promises of ") << quantile(summary.promised_s, 0.5)
-       << " s in the middle, " << promises.kept << " kept, " << promises.broken << " void, " << promises.unseen()
-       << " not looked at" << (summary.first_broken.empty() ? "" : "; the first that was void: ")
-       << summary.first_broken;
+  text << "safe until: " << promises.made << (promises.made == 1 ? " promise of " : " promises of ")
+       << quantile(summary.promised_s, 0.5) << " s in the middle, " << promises.kept << " kept, " << promises.broken
+       << " void, " << promises.unseen() << " not looked at"
+       << (summary.first_broken.empty() ? "" : "; the first that was void: ") << summary.first_broken;
   return text.str();
 }
 

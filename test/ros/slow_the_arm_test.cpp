@@ -134,7 +134,7 @@ TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
   const auto near = send(0.43);
   EXPECT_EQ(near.broken, "") << "0.02 m in 0.1 s";
   const auto fast = send(0.25);
-  EXPECT_NE(fast.broken.find("'tip' was faster than 0.5 m/s: vertex 0 came 0.18 m in 0.1 s"), std::string::npos)
+  EXPECT_NE(fast.broken.find("'tip' was faster than 0.5 m/s: vertex 0 came 0.18 m in "), std::string::npos)
       << fast.broken;
   EXPECT_TRUE(waitUntil([&] {
     const auto said = states.all();

@@ -150,8 +150,8 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, ArmManner manner, const std::fun
       followed_s = on_the_way.front().stamp_s;
       on_the_way.pop_front();
     }
-    // The arm knows nothing of the wall.
-    const bool late = now_s - answered_s > Loop::REACTION_S;
+    // The arm knows nothing of the wall, and follows no scale of a frame that is older than the law reckons with.
+    const bool late = now_s - followed_s > Loop::REACTION_S;
     const double target_m_s = (late ? 0 : std::min(wanted, wish.at(now_s))) * Loop::FULL_SPEED_M_S;
     if (!late && wanted > 0) run.oldest_s = std::max(run.oldest_s, now_s - followed_s);
     speed_m_s = std::clamp(target_m_s, speed_m_s - braking_m_s2 * TICK_S, speed_m_s + picks_up_m_s2 * TICK_S);

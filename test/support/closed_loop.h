@@ -45,8 +45,8 @@ struct ClosedLoopRun {
 /// A cloth of 8 x 6 points hangs from a gripper that wants to go along x: over a post, whose top the hem clears by 30
 /// to 80 mm, and into a wall, of which the arm knows nothing. Post, wall, gusts, latency, lost frames and brakes follow
 /// from the seed. `scale`: of full speed, 0 to 1, from the answer to each frame that is not lost, clearances included;
-/// of the cloth alone (body 0) and the map. The arm is never faster than that, and stops where no newer answer comes
-/// within REACTION_S.
+/// of the cloth alone (body 0) and the map. The arm is never faster than that, and stops where the frame of the
+/// newest scale that has come to it is older than REACTION_S.
 ClosedLoopRun runClosedLoop(std::uint64_t seed, ArmManner manner, const std::function<double(const Outcome&)>& scale);
 
 /// The least distance of the cloth and the map at the answer's end [m], for laws that know no more.
