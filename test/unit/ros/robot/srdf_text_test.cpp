@@ -9,7 +9,7 @@ namespace {
 using Names = std::vector<std::string>;
 
 /// base - arm - wrist - palm, which carries thumb and finger.
-std::string hand() {
+std::string handSrdf() {
   return robotOf(link("base", "") + link("arm", "") + link("wrist", "") +
                  link("palm", collision("<box size='1 1 1'/>")) + link("thumb", "") + link("finger", "") +
                  joint("base", "arm") + joint("arm", "wrist") + joint("wrist", "palm") + joint("palm", "thumb") +
@@ -18,7 +18,7 @@ std::string hand() {
 
 TEST(Srdf, GroupsAreLinksChainsJointsAndGroups) {
   const Robot robot = robotFrom(
-      hand(),
+      handSrdf(),
       robotOf("<group name='all'><group name='hand'/><group name='arm'/></group>"
               "<group name='arm'><chain base_link='base' tip_link='wrist'/></group>"
               "<group name='hand'><link name='palm'/><joint name='palm_finger'/><joint name='virtual'/></group>"
@@ -38,20 +38,21 @@ TEST(Srdf, GroupsAreLinksChainsJointsAndGroups) {
 
 // As MoveIt has it: from one tip to another, and from a tip to the base.
 TEST(Srdf, AChainMayLeadOverALinkFromWhichBothEndsHang) {
-  const Robot robot = robotFrom(hand(), robotOf("<group name='a'><chain base_link='thumb' tip_link='finger'/></group>"
-                                                "<group name='b'><chain base_link='palm' tip_link='arm'/></group>"
-                                                "<group name='c'><chain base_link='arm' tip_link='arm'/></group>"));
+  const Robot robot =
+      robotFrom(handSrdf(), robotOf("<group name='a'><chain base_link='thumb' tip_link='finger'/></group>"
+                                    "<group name='b'><chain base_link='palm' tip_link='arm'/></group>"
+                                    "<group name='c'><chain base_link='arm' tip_link='arm'/></group>"));
   EXPECT_EQ(robot.groups.at("a"), (Names{"thumb", "palm", "finger"}));
   EXPECT_EQ(robot.groups.at("b"), (Names{"palm", "wrist", "arm"}));
   EXPECT_EQ(robot.groups.at("c"), Names{"arm"});
 }
 
 TEST(Srdf, DefaultsOfALinkGiveWayToPairs) {
-  const Robot robot = robotFrom(hand(), robotOf("<disable_collisions link1='thumb' link2='finger'/>"
-                                                "<enable_collisions link1='palm' link2='thumb'/>"
-                                                "<enable_collisions link1='arm' link2='palm'/>"
-                                                "<disable_collisions link1='palm' link2='arm'/>"
-                                                "<disable_default_collisions link='palm'/>"));
+  const Robot robot = robotFrom(handSrdf(), robotOf("<disable_collisions link1='thumb' link2='finger'/>"
+                                                    "<enable_collisions link1='palm' link2='thumb'/>"
+                                                    "<enable_collisions link1='arm' link2='palm'/>"
+                                                    "<disable_collisions link1='palm' link2='arm'/>"
+                                                    "<disable_default_collisions link='palm'/>"));
   using Pair = std::pair<std::string, std::string>;
   EXPECT_EQ(robot.never_meet,
             (std::vector<Pair>{
@@ -60,10 +61,11 @@ TEST(Srdf, DefaultsOfALinkGiveWayToPairs) {
 
 // It is left out and named; the rest holds.
 TEST(Srdf, UnknownLinksAndJointsAreNamed) {
-  const Robot robot = robotFrom(hand(), robotOf("<group name='hand'>\n<link name='pall'/><link name='palm'/></group>"
-                                                "<group name='b'><joint name='turn'/></group>"
-                                                "<group name='c'><chain base_link='base' tip_link='tip'/></group>"
-                                                "<disable_collisions link1='palm' link2='cover'/>"));
+  const Robot robot =
+      robotFrom(handSrdf(), robotOf("<group name='hand'>\n<link name='pall'/><link name='palm'/></group>"
+                                    "<group name='b'><joint name='turn'/></group>"
+                                    "<group name='c'><chain base_link='base' tip_link='tip'/></group>"
+                                    "<disable_collisions link1='palm' link2='cover'/>"));
   EXPECT_TRUE(robot.semantic_known);
   EXPECT_EQ(robot.groups.at("hand"), Names{"palm"});
   EXPECT_TRUE(robot.never_meet.empty());
@@ -82,7 +84,7 @@ TEST(Srdf, GroupsBesideEachOtherAreNotNested) {
           nested && i > 0 ? "<group name='g" + std::to_string(i - 1) + "'/>" : "<link name='palm'/>";
       text = "<group name='g" + std::to_string(i) + "'>" + next + "</group>" + text;
     }
-    return robotFrom(hand(),
+    return robotFrom(handSrdf(),
                      robotOf("<group name='all'><group name='g" + std::to_string(count - 1) + "'/></group>" + text));
   };
   EXPECT_EQ(groups(200, false).groups.size(), 201u);
@@ -102,7 +104,7 @@ TEST(Srdf, WhatIsNoneIsRefusedWithItsPlace) {
       {robotOf("<disable_collisions link1='palm'/>"), "needs the attribute link2"},
   };
   for (const auto& [text, expected] : cases) {
-    const Robot robot = robotFrom(hand(), text);
+    const Robot robot = robotFrom(handSrdf(), text);
     EXPECT_FALSE(robot.semantic_known);
     EXPECT_EQ(robot.parts.size(), 1u) << "the links are there";
     ASSERT_EQ(robot.missing.size(), 1u) << text;
