@@ -7,6 +7,8 @@
 namespace dccd {
 namespace {
 
+constexpr std::size_t MOST_IDS = 64;  // that are remembered
+
 /// A name may be as long as a message; its beginning tells markers apart.
 std::string namespaceOf(const MarkerView& marker) { return std::string(marker.ns.substr(0, MAX_NAME)); }
 
@@ -29,7 +31,8 @@ bool MarkerNames::isOther(const MarkerView& marker) const {
 void MarkerNames::require(const std::vector<const MarkerView*>& taken) {
   const bool other_namespace =
       !namespaces_.empty() && std::none_of(taken.begin(), taken.end(), [&](const auto* one) { return has(*one); });
-  const bool other_id = is_alone_ && taken[0]->is_message && taken[0]->id < id_;
+  const bool other_id = is_alone_ && taken[0]->is_message && taken[0]->id != id_ &&
+                        std::find(ids_before_.begin(), ids_before_.end(), taken[0]->id) != ids_before_.end();
   if (conflict_.empty() && (other_namespace || other_id)) {
     conflict_ = "messages with marker " + example_ + " and with " + nameOf(*taken[0]) +
                 " come in turn, so that it is not known which is the mesh; name it by " +
@@ -45,6 +48,8 @@ void MarkerNames::keep(const std::vector<const MarkerView*>& taken) {
   std::sort(namespaces_.begin(), namespaces_.end());
   namespaces_.erase(std::unique(namespaces_.begin(), namespaces_.end()), namespaces_.end());
   example_ = nameOf(*taken[0]);
+  if (is_alone_ && id_ != taken[0]->id) ids_before_.push_back(id_);
+  if (ids_before_.size() > MOST_IDS) ids_before_.pop_front();
   is_alone_ = taken[0]->is_message;
   id_ = taken[0]->id;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,8 +15,8 @@ namespace dccd {
 std::string nameOf(std::string_view ns, std::int32_t id);
 std::string nameOf(const MarkerView& marker);
 
-/// Of the markers that were taken for the mesh, from message to message. A Marker alone may be numbered anew each time,
-/// upwards: an id that comes back after a higher one is another marker's.
+/// Of the markers that were taken for the mesh, from message to message. A Marker alone may be numbered anew each time:
+/// an id that comes back after another one is another marker's.
 class MarkerNames {
  public:
   /// Throws WireError with both names where these are not those of the message before; from then on always, until
@@ -32,6 +33,7 @@ class MarkerNames {
   std::string example_;                  // a name of the message before
   bool is_alone_ = false;                // it was a message of one marker
   std::int32_t id_ = 0;
+  std::deque<std::int32_t> ids_before_;  // those before it
   std::string conflict_;
 
   bool has(const MarkerView& marker) const;
