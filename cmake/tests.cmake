@@ -150,6 +150,16 @@ if(fcl_FOUND)
   target_link_libraries(robot_benchmark PRIVATE deformable_ccd_test_support deformable_ccd_ros fcl GTest::gtest
     CLI11::CLI11 nlohmann_json::nlohmann_json ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 endif()
+# scripts/benchmark cell_live: the cell around the node, and what stands beside it for octomap_server.
+#catkin_lint: ignore uninstalled_target
+foreach(tool cell_publisher cell_octomap_server)
+  add_executable(${tool} EXCLUDE_FROM_ALL benchmark/${tool}.cpp)
+  add_dependencies(${tool} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
+  target_include_directories(${tool} PRIVATE src)
+  target_include_directories(${tool} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
+  target_link_libraries(${tool} PRIVATE deformable_ccd_ros ${ROS_LINK_LIBRARIES} CLI11::CLI11
+    nlohmann_json::nlohmann_json ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
+endforeach()
 if(TARGET deformable_ccd_physics)
   add_gtest_suite(physics_tests SOURCES ${physics_SOURCES} LIBRARIES deformable_ccd_physics deformable_ccd)
 endif()
