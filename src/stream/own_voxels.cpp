@@ -47,9 +47,11 @@ KeyBox reachedKeys(const ObstacleMap& map, const std::vector<TrackedBody>& bodie
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Eigen::AlignedBox3d reached;
     bool turns = false;
+    const MeshFrame* last = nullptr;
     for (const MeshStore::Stretch& stretch : paths[b]) {
       turns = turns || stretch.to->rigid;
-      for (const MeshFrame* frame : {stretch.from.get(), stretch.to.get()}) {
+      for (const MeshFrame* frame : {stretch.to.get(), stretch.from.get()}) {
+        if (std::exchange(last, frame) == frame) continue;  // where one stretch ends the next one begins
         for (const Vec3& p : frame->positions) {
           if (const Vec3 q = map.map_from_fixed * p; q.allFinite()) reached.extend(q);
         }
@@ -105,6 +107,7 @@ void OwnVoxelFinder::forget() {
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
+  shapes_.erase(body);
   const std::size_t before = own_.size();
   for (auto one = own_.begin(); one != own_.end();) one = one->second.body == body ? own_.erase(one) : std::next(one);
   return before_ && own_.size() < before;
@@ -213,7 +216,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   const VoxelTree& sure = trusted ? trusted->impl().tree : nothing;
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
   std::vector<ReachedCube> cubes = cubesToAsk(*map.surface, sure, reachedKeys(map, bodies, ways));
-  searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes);
+  searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes, &shapes_);
   std::set<int> unknown_yet;
   for (const TrackedBody& body : bodies) {
     const bool is_older = !body.holds_always && !body.frames->empty() && map.stamp_ns < body.frames->oldest().stamp_ns;

@@ -66,6 +66,7 @@ class OwnVoxelFinder {
   std::string frame_id_;
   std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
   std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
+  RigidShapes shapes_;                               // of bodies that have been asked about
   std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
   std::string missed_;                               // why maps were not looked at since the last one; empty: all were
   std::string doubts_missed_;                        // the same, where some doubt is for that reason

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "dccd/tolerances.h"
 
@@ -29,16 +30,34 @@ Vec3 closestOn(const std::array<Vec3, 3>& t, const Vec3& p) {
   return t[0] + v * ab + w * ac;
 }
 
+/// What a face may reach.
+struct FaceReach {
+  double lo[3], hi[3], near_m;
+
+  /// False: nothing.
+  bool find(const std::array<Vec3, 3>& t, double reach_m) {
+    double largest_m = 0;
+    for (int a = 0; a < 3; ++a) {
+      const auto [least, most] = std::minmax({t[0][a], t[1][a], t[2][a]});
+      if (!std::isfinite(t[0][a]) || !std::isfinite(t[1][a]) || !std::isfinite(t[2][a])) return false;
+      lo[a] = least - reach_m;
+      hi[a] = most + reach_m;
+      largest_m = std::max({largest_m, std::abs(lo[a]), std::abs(hi[a])});
+    }
+    near_m = nearOf(reach_m, largest_m);
+    return near_m > 0;
+  }
+  /// What is within this is within reach, of coordinates up to the largest; 0 or less: nobody knows.
+  static double nearOf(double reach_m, double largest_m) {
+    return reach_m - tolerance::OWN_REACH * (reach_m + largest_m);
+  }
+};
+
 class ReachSearch {
  public:
-  ReachSearch(std::vector<ReachedCube>& cubes, double resolution_m) : cubes_(cubes), resolution_m_(resolution_m) {
-    for (const ReachedCube& cube : cubes) {
-      for (int a = 0; a < 3; ++a) {
-        lo_[a] = std::min(lo_[a], cube.box.lo[a]);
-        hi_[a] = std::max(hi_[a], cube.box.hi[a]);
-      }
-    }
-    sort();
+  ReachSearch(std::vector<ReachedCube>& cubes, double resolution_m, RigidShapes* shapes)
+      : cubes_(cubes), resolution_m_(resolution_m), shapes_(shapes), left_(cubes.size()), asked_(cubes.size(), 0) {
+    grid_.build(cubes.size(), 4 * resolution_m, [&](std::size_t i) -> const LeafBox& { return cubes[i].box; });
   }
 
   void search(const TrackedBody& body, const std::vector<MeshStore::Stretch>& path,
@@ -52,70 +71,33 @@ class ReachSearch {
  private:
   std::vector<ReachedCube>& cubes_;
   double resolution_m_;
-  std::array<double, 3> lo_{1e300, 1e300, 1e300}, hi_{-1e300, -1e300, -1e300};
-  double cell_m_ = 0;
-  std::array<std::int64_t, 3> cells_{0, 0, 0};
-  std::vector<std::uint32_t> first_, listed_;  // per cell its first place in the list; numbers of cubes
-  std::size_t left_ = 0;
+  RigidShapes* shapes_;
+  BoxGrid grid_;
+  std::size_t left_;
+  std::vector<std::uint64_t> asked_;  // per cube, the last place of a rigid body that came to it
+  std::uint64_t place_ = 0;
   Positions at_;
-
-  std::int64_t cellOf(double x, int a) const {
-    return static_cast<std::int64_t>(std::clamp((x - lo_[a]) / cell_m_, 0.0, static_cast<double>(cells_[a] - 1)));
-  }
-  template <class Visit>
-  void visitCells(const double* lo, const double* hi, Visit visit) const {
-    std::array<std::int64_t, 3> low, high;
-    for (int a = 0; a < 3; ++a) {
-      if (!(hi[a] >= lo_[a] && lo[a] <= hi_[a])) return;
-      low[a] = cellOf(lo[a], a);
-      high[a] = cellOf(hi[a], a);
-    }
-    for (std::int64_t z = low[2]; z <= high[2]; ++z) {
-      for (std::int64_t y = low[1]; y <= high[1]; ++y) {
-        for (std::int64_t x = low[0]; x <= high[0]; ++x) {
-          visit(static_cast<std::size_t>((z * cells_[1] + y) * cells_[0] + x));
-        }
-      }
-    }
-  }
-
-  void sort() {
-    left_ = cubes_.size();
-    if (cubes_.empty()) return;
-    constexpr double MOST_CELLS = 1 << 20;
-    for (cell_m_ = 4 * resolution_m_;; cell_m_ *= 2) {
-      double count = 1;
-      for (int a = 0; a < 3; ++a) count *= std::floor((hi_[a] - lo_[a]) / cell_m_) + 1;
-      if (count <= MOST_CELLS) break;
-    }
-    for (int a = 0; a < 3; ++a) cells_[a] = static_cast<std::int64_t>((hi_[a] - lo_[a]) / cell_m_) + 1;
-    first_.assign(static_cast<std::size_t>(cells_[0] * cells_[1] * cells_[2]) + 1, 0);
-    for (const ReachedCube& cube : cubes_)
-      visitCells(cube.box.lo, cube.box.hi, [&](std::size_t cell) { ++first_[cell + 1]; });
-    for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-    listed_.resize(first_.back());
-    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-    for (std::uint32_t i = 0; i < cubes_.size(); ++i) {
-      visitCells(cubes_[i].box.lo, cubes_[i].box.hi, [&](std::size_t cell) { listed_[next[cell]++] = i; });
-    }
-  }
 
   void searchAlong(const TrackedBody& body, const MeshStore::Stretch& stretch,
                    const Eigen::Isometry3d& map_from_fixed) {
     const MeshFrame &from = *stretch.from, &to = *stretch.to;
     double way_m = 0;
     for (std::size_t v = 0; v < to.positions.size(); ++v) {
-      const double m = (to.positions[v] - from.positions[v]).norm();
+      const double m = (to.positions[v] - from.positions[v]).squaredNorm();
       if (m > way_m) way_m = m;
     }
-    way_m *= stretch.last - stretch.first;
+    way_m = std::sqrt(way_m) * (stretch.last - stretch.first);
     const int places =
         std::min<int>(tolerance::MOST_OWN_PLACES,
                       static_cast<int>(std::min(1e6, std::ceil(way_m / (tolerance::OWN_PLACES * resolution_m_)))));
+    RigidShape* const shape = to.rigid && shapes_ ? &(*shapes_)[body.body] : nullptr;
+    const bool is_known = shape && to.topology->hasFaces() && shape->isOf(to, resolution_m_);
     for (int i = 0; i <= places && left_ > 0; ++i) {
       const double u = places == 0 ? stretch.last : stretch.last + (stretch.first - stretch.last) * i / places;
       if (to.rigid) {
-        const Eigen::Isometry3d moved = map_from_fixed * interpolate(from.pose, to.pose, u) * to.pose.inverse();
+        const Eigen::Isometry3d map_from_body = map_from_fixed * interpolate(from.pose, to.pose, u);
+        const Eigen::Isometry3d moved = map_from_body * to.pose.inverse();
+        if (is_known && askRigid(body, to, *shape, map_from_body, moved)) continue;
         at_.resize(to.positions.size());
         for (std::size_t v = 0; v < at_.size(); ++v) at_[v] = moved * to.positions[v];
       } else {
@@ -131,57 +113,79 @@ class ReachSearch {
     }
   }
 
+  void settle(ReachedCube& cube, const TrackedBody& body) {
+    cube.body = body.body;
+    --left_;
+  }
+
   void ask(const TrackedBody& body, const std::array<Vec3, 3>& t) {
-    double lo[3], hi[3], largest_m = 0;
-    for (int a = 0; a < 3; ++a) {
-      const auto [least, most] = std::minmax({t[0][a], t[1][a], t[2][a]});
-      if (!std::isfinite(t[0][a]) || !std::isfinite(t[1][a]) || !std::isfinite(t[2][a])) return;
-      lo[a] = least - body.reach_m;
-      hi[a] = most + body.reach_m;
-      largest_m = std::max({largest_m, std::abs(lo[a]), std::abs(hi[a])});
-    }
-    const double near_m = body.reach_m - tolerance::OWN_REACH * (body.reach_m + largest_m);
-    if (!(near_m > 0)) return;
-    visitCells(lo, hi, [&](std::size_t cell) {
-      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
-        ReachedCube& cube = cubes_[listed_[i]];
-        if (cube.body >= 0) continue;
-        bool apart = false;
-        for (int a = 0; a < 3; ++a) apart = apart || cube.box.lo[a] > hi[a] || cube.box.hi[a] < lo[a];
-        if (apart || !reaches(t, cube.box, near_m)) continue;
-        cube.body = body.body;
-        --left_;
-      }
+    FaceReach reach;
+    if (!reach.find(t, body.reach_m)) return;
+    grid_.visit(reach.lo, reach.hi, [&](std::uint32_t i) {
+      if (cubes_[i].body < 0 && reaches(t, reach, cubes_[i].box)) settle(cubes_[i], body);
     });
   }
 
-  /// Cubes whose middle lies inside of a closed body: solid angles (Van Oosterom and Strackee 1983) add up to 0 outside
-  /// and to a multiple of 4 pi inside. What comes up here is farther from the surface than rounding can matter.
+  /// Cubes whose middle lies inside of a closed body. What comes up here is farther from the surface than rounding can
+  /// matter.
   void askInside(const TrackedBody& body, const Topology& topology) {
     Eigen::AlignedBox3d bounds;
     for (const Index v : topology.usedVertices()) bounds.extend(at_[v]);
     if (!bounds.min().allFinite() || !bounds.max().allFinite()) return;
-    visitCells(bounds.min().data(), bounds.max().data(), [&](std::size_t cell) {
-      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
-        ReachedCube& cube = cubes_[listed_[i]];
-        const Eigen::Map<const Vec3> lo(cube.box.lo), hi(cube.box.hi);
-        const Vec3 middle = 0.5 * (lo + hi);
-        if (cube.body >= 0 || !bounds.contains(middle)) continue;
-        double angle = 0;
-        for (const Face& f : topology.faces()) {
-          const Vec3 a = at_[f[0]] - middle, b = at_[f[1]] - middle, c = at_[f[2]] - middle;
-          const double la = a.norm(), lb = b.norm(), lc = c.norm();
-          angle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-        }
-        if (!(std::abs(angle) >= 2 * M_PI)) continue;  // also where a vertex is not finite
-        cube.body = body.body;
-        --left_;
-      }
+    grid_.visit(bounds.min().data(), bounds.max().data(), [&](std::uint32_t i) {
+      if (cubes_[i].body >= 0) return;
+      const Vec3 middle = middleOf(cubes_[i].box);
+      if (bounds.contains(middle) && isInside(at_, topology.faces(), middle)) settle(cubes_[i], body);
     });
   }
 
+  /// The same of a rigid body, the other way round: each cube asks for the faces near it, in the body's frame. There
+  /// are many more faces than cubes. False: not here.
+  bool askRigid(const TrackedBody& body, const MeshFrame& frame, RigidShape& shape,
+                const Eigen::Isometry3d& map_from_body, const Eigen::Isometry3d& moved) {
+    const Eigen::Isometry3d body_from_map = map_from_body.inverse();
+    const Topology& topology = *frame.topology;
+    const double slack_m = 2 * RigidShape::SLACK * resolution_m_;
+    Eigen::AlignedBox3d bounds;
+    for (int corner = 0; corner < 8; ++corner) {
+      bounds.extend(map_from_body * shape.bounds().corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)));
+    }
+    const Vec3 lo = bounds.min().array() - (body.reach_m + slack_m),
+               hi = bounds.max().array() + (body.reach_m + slack_m);
+    // Where coordinates are that large no face says what it reaches, and a cube may be at the surface.
+    if (!(FaceReach::nearOf(body.reach_m, 2 * lo.cwiseAbs().cwiseMax(hi.cwiseAbs()).maxCoeff()) > 0)) return false;
+    ++place_;
+    grid_.visit(lo.data(), hi.data(), [&](std::uint32_t i) {
+      ReachedCube& cube = cubes_[i];
+      if (cube.body >= 0 || std::exchange(asked_[i], place_) == place_) return;
+      const Vec3 middle = middleOf(cube.box), point = body_from_map * middle;
+      const double half_m = 0.5 * (Eigen::Map<const Vec3>(cube.box.hi) - Eigen::Map<const Vec3>(cube.box.lo)).norm();
+      const double near_m = half_m + body.reach_m + slack_m;
+      if (shape.bounds().squaredExteriorDistance(point) > near_m * near_m) return;
+      bool is_reached = false;
+      shape.visitNear(point, near_m, [&](std::uint32_t number) {
+        if (is_reached) return;
+        const Face& f = topology.faces()[number];
+        const std::array<Vec3, 3> t{moved * frame.positions[f[0]], moved * frame.positions[f[1]],
+                                    moved * frame.positions[f[2]]};
+        FaceReach reach;
+        is_reached = reach.find(t, body.reach_m) && reaches(t, reach, cube.box);
+      });
+      // A cube that no face reaches has its middle half a voxel from all of them at the least.
+      if (is_reached || (topology.isClosed() && !body.shell && shape.holds(point))) settle(cube, body);
+    });
+    return true;
+  }
+
+  static Vec3 middleOf(const LeafBox& box) {
+    return 0.5 * (Eigen::Map<const Vec3>(box.lo) + Eigen::Map<const Vec3>(box.hi));
+  }
+
   /// From one to the other and back: each pair of points that comes up is one of the triangle and one of the cube.
-  static bool reaches(const std::array<Vec3, 3>& t, const LeafBox& box, double near_m) {
+  static bool reaches(const std::array<Vec3, 3>& t, const FaceReach& reach, const LeafBox& box) {
+    for (int a = 0; a < 3; ++a) {
+      if (box.lo[a] > reach.hi[a] || box.hi[a] < reach.lo[a]) return false;
+    }
     constexpr int MOST_TURNS = 24;
     const Eigen::Map<const Vec3> lo(box.lo), hi(box.hi);
     Vec3 q = 0.5 * (lo + hi);
@@ -190,7 +194,7 @@ class ReachSearch {
       const Vec3 p = closestOn(t, q);
       q = p.cwiseMax(lo).cwiseMin(hi);
       const double squared = (p - q).squaredNorm();
-      if (squared <= near_m * near_m) return true;
+      if (squared <= reach.near_m * reach.near_m) return true;
       if (!(squared < 0.999 * before) && turn > 2) return false;
       before = squared;
     }
@@ -201,8 +205,9 @@ class ReachSearch {
 }  // namespace
 
 void searchReach(const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways,
-                 const Eigen::Isometry3d& map_from_fixed, double resolution_m, std::vector<ReachedCube>& cubes) {
-  ReachSearch search(cubes, resolution_m);
+                 const Eigen::Isometry3d& map_from_fixed, double resolution_m, std::vector<ReachedCube>& cubes,
+                 RigidShapes* shapes) {
+  ReachSearch search(cubes, resolution_m, shapes);
   for (std::size_t b = 0; b < bodies.size(); ++b) search.search(bodies[b], ways[b], map_from_fixed);
 }
 

@@ -7,6 +7,7 @@
 
 #include "dccd/mesh_store.h"
 #include "obstacle/voxel_surface_impl.h"
+#include "stream/rigid_shape.h"
 
 namespace dccd {
 
@@ -33,8 +34,10 @@ struct ReachedCube {
 
 /// Sets the bodies. A cube counts as reached only where a point of a body's surface at some time of its way, and a
 /// point of the cube, are seen to be within reach_m: the answer may miss a reach at the very rim, and invents none. So
-/// does a cube whose middle is inside of a closed rigid body that is no shell.
+/// does a cube whose middle is inside of a closed rigid body that is no shell. `shapes`: of rigid bodies, to be kept
+/// from one map to the next; the answer is the same without them (null), and takes longer.
 void searchReach(const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways,
-                 const Eigen::Isometry3d& map_from_fixed, double resolution_m, std::vector<ReachedCube>& cubes);
+                 const Eigen::Isometry3d& map_from_fixed, double resolution_m, std::vector<ReachedCube>& cubes,
+                 RigidShapes* shapes);
 
 }  // namespace dccd

@@ -1,0 +1,88 @@
+// Boxes in the cells of a grid: which of them may meet another box.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace dccd {
+
+class BoxGrid {
+ public:
+  /// Of `count` boxes; boxOf(i) has `lo` and `hi`, indexed by axis, of finite numbers. Cells are this wide, or wider
+  /// where there would be too many.
+  template <class BoxOf>
+  void build(std::size_t count, double cell_m, BoxOf boxOf) {
+    lo_.fill(1e300);
+    hi_.fill(-1e300);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto& box = boxOf(i);
+      for (int a = 0; a < 3; ++a) {
+        lo_[a] = std::min(lo_[a], box.lo[a]);
+        hi_[a] = std::max(hi_[a], box.hi[a]);
+      }
+    }
+    first_.clear();
+    listed_.clear();
+    if (count == 0) return;
+    constexpr double MOST_CELLS = 1 << 20;
+    for (;; cell_m *= 2) {
+      double cells = 1;
+      for (int a = 0; a < 3; ++a) cells *= std::floor((hi_[a] - lo_[a]) / cell_m) + 1;
+      if (cells <= MOST_CELLS) break;
+    }
+    inverse_cell_ = 1 / cell_m;
+    for (int a = 0; a < 3; ++a) cells_[a] = static_cast<std::int64_t>((hi_[a] - lo_[a]) * inverse_cell_) + 1;
+    first_.assign(static_cast<std::size_t>(cells_[0] * cells_[1] * cells_[2]) + 1, 0);
+    const auto forEachCell = [&](auto&& take) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto& box = boxOf(i);
+        visitCells(&box.lo[0], &box.hi[0], [&](std::size_t cell) { take(i, cell); });
+      }
+    };
+    forEachCell([&](std::size_t, std::size_t cell) { ++first_[cell + 1]; });
+    for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
+    listed_.resize(first_.back());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    forEachCell([&](std::size_t i, std::size_t cell) { listed_[next[cell]++] = static_cast<std::uint32_t>(i); });
+  }
+
+  /// Calls visit(i) for at least the boxes that meet this closed one; for some more than once.
+  template <class Visit>
+  void visit(const double* lo, const double* hi, Visit&& visit) const {
+    if (first_.empty()) return;
+    visitCells(lo, hi, [&](std::size_t cell) {
+      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) visit(listed_[i]);
+    });
+  }
+
+ private:
+  std::array<double, 3> lo_{}, hi_{};
+  std::array<std::int64_t, 3> cells_{};
+  double inverse_cell_ = 0;
+  std::vector<std::uint32_t> first_, listed_;  // per cell its first place in the list; numbers of boxes
+
+  std::int64_t cellOf(double x, int a) const {
+    return static_cast<std::int64_t>(std::clamp((x - lo_[a]) * inverse_cell_, 0.0, static_cast<double>(cells_[a] - 1)));
+  }
+  template <class Visit>
+  void visitCells(const double* lo, const double* hi, Visit&& visit) const {
+    std::array<std::int64_t, 3> low, high;
+    for (int a = 0; a < 3; ++a) {
+      if (!(hi[a] >= lo_[a] && lo[a] <= hi_[a])) return;
+      low[a] = cellOf(lo[a], a);
+      high[a] = cellOf(hi[a], a);
+    }
+    for (std::int64_t z = low[2]; z <= high[2]; ++z) {
+      for (std::int64_t y = low[1]; y <= high[1]; ++y) {
+        for (std::int64_t x = low[0]; x <= high[0]; ++x) {
+          visit(static_cast<std::size_t>((z * cells_[1] + y) * cells_[0] + x));
+        }
+      }
+    }
+  }
+};
+
+}  // namespace dccd

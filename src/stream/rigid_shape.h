@@ -1,0 +1,60 @@
+// A rigid body in its own frame, where it is the same from frame to frame: which of its faces are near a point, and
+// whether a point is inside of it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "dccd/mesh_store.h"
+#include "stream/box_grid.h"
+
+namespace dccd {
+
+/// Whether the point is inside of a closed surface: solid angles (Van Oosterom and Strackee 1983) add up to 0 outside
+/// and to a multiple of 4 pi inside. False where a vertex is not finite, and anything at the surface itself.
+bool isInside(const Positions& positions, const std::vector<Face>& faces, const Vec3& point);
+
+/// Not thread-safe.
+class RigidShape {
+ public:
+  /// Whether it is the shape of this frame, up to SLACK of a voxel; it becomes that if it was another one. False where
+  /// the frame has a vertex that is not finite.
+  bool isOf(const MeshFrame& frame, double resolution_m);
+
+  static constexpr double SLACK = 1e-6;
+  const Eigen::AlignedBox3d& bounds() const { return bounds_; }
+  /// Calls visit(number) for at least the faces within `near_m` of a point of the body's frame, for each once.
+  template <class Visit>
+  void visitNear(const Vec3& point, double near_m, Visit&& visit) {
+    ++question_;
+    const Vec3 lo = point.array() - near_m, hi = point.array() + near_m;
+    faces_.visit(lo.data(), hi.data(), [&](std::uint32_t f) {
+      if (std::exchange(asked_[f], question_) == question_) return;
+      if (boxes_[f].squaredExteriorDistance(point) <= near_m * near_m) visit(f);
+    });
+  }
+  /// The same as isInside() for a point that is at least half a voxel from the surface of a closed body.
+  bool holds(const Vec3& point);
+
+ private:
+  std::shared_ptr<const Topology> topology_;
+  double resolution_m_ = 0;
+  Positions points_;  // of its vertices
+  Eigen::AlignedBox3d bounds_;
+  std::vector<Eigen::AlignedBox3d> boxes_;  // of faces
+  BoxGrid faces_;
+  std::vector<std::uint64_t> asked_;  // per face, the last question that came to it
+  std::uint64_t question_ = 0;
+  std::unordered_map<std::uint64_t, bool> inside_;  // by cell of a grid, as far as anybody asked
+
+  void build(const MeshFrame& frame, double resolution_m);
+};
+
+/// By number of body.
+using RigidShapes = std::map<std::uint16_t, RigidShape>;
+
+}  // namespace dccd
