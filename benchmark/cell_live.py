@@ -50,7 +50,7 @@ def rows_of(arguments):
         if unknown:
             sys.exit('cell_live: no row %s; there are %s' % (', '.join(sorted(unknown)), ', '.join(row[0] for row in rows)))
         return [row for row in rows if row[0] in arguments.rows]
-    return [row for row in rows if row[1] == 'clouds' or (row[1] == 'server' and row[3])]
+    return [row for row in rows if row[1] == 'clouds' or row[3]]
 
 
 def package_of(data, folder):
@@ -91,12 +91,12 @@ def measure(arguments, which, rate, distances, out):
                 watched['octomap_server'] = start(arguments.tools + '/cell_octomap_server', '_resolution:=0.02', '_max_range:=2.0')
             watched['monitor'] = start(arguments.monitor, '__name:=' + MONITOR[1:])
             master = rosgraph.Master('/cell_live')
-            wait_for(lambda: any(topic == MONITOR + '/stats' for topic, _ in master.getSystemState()[0]), 30, 'the monitor')
+            wait_for(lambda: any(topic == MONITOR + '/stats' for topic, _ in master.getSystemState()[0]), 60, 'the monitor')
             cell = start(arguments.tools + '/cell_publisher', '--urdf', str(urdf), '--out', str(out), '--monitor', MONITOR,
                          '--camera-hz', str(rate), '--start-s', str(arguments.start_s), '--seconds', str(arguments.seconds),
                          *words, *arguments.cell.split(), *('--process=%s=%d' % (name, p.pid) for name, p in watched.items()))
             if arguments.perf:
-                subprocess.run(['perf', 'record', '-o', arguments.perf, '-F', '999', '-g', '--call-graph', 'fp', '-p',
+                subprocess.run(['perf', 'record', '-o', arguments.perf, '-F', '999', '-p',
                                 str(watched['monitor'].pid), '--', 'sleep', str(arguments.start_s + arguments.seconds + 10)])
             if cell.wait(timeout=120 + arguments.start_s + arguments.seconds) != 0:
                 sys.exit('cell_live: the cell failed; see %s' % out.with_suffix('.log'))
@@ -142,7 +142,7 @@ def main():
     parser.add_argument('--seconds', type=float, default=20)
     parser.add_argument('--parameters', default='{}', help='JSON, over those of the monitor')
     parser.add_argument('--cell', default='', help='further words for cell_publisher')
-    parser.add_argument('--perf', help='file for perf record of the monitor, start included')
+    parser.add_argument('--perf', help='file for perf record of the monitor, start included; with one row alone')
     arguments = parser.parse_args()
     folder = pathlib.Path(arguments.out)
     folder.mkdir(parents=True, exist_ok=True)

@@ -45,6 +45,7 @@ struct Settings {
   std::vector<std::string> processes;  // NAME=PID
   double camera_hz = 15, noise_m = 0.003, lost_share = 0.05, flying_share = 0.001, start_s = 5, seconds = 20;
   bool clouds = false, images = false;
+  int stride = 1;
 };
 
 // --- what moves
@@ -310,7 +311,8 @@ class Camera {
   Camera(ros::NodeHandle& node, const Settings& settings, const Arm& arm)
       : settings_(settings),
         film_(settings, arm),
-        cloud_(cloudOf(HEIGHT, WIDTH, sensor_msgs::PointField::FLOAT32, 16)) {
+        cloud_(cloudOf(static_cast<std::uint32_t>(HEIGHT / settings.stride),
+                       static_cast<std::uint32_t>(WIDTH / settings.stride), sensor_msgs::PointField::FLOAT32, 16)) {
     if (settings.clouds) clouds_ = node.advertise<sensor_msgs::PointCloud2>("/camera/depth/color/points", 2);
     if (settings.images) {
       images_ = node.advertise<sensor_msgs::Image>("/camera/depth/image_rect_raw", 2);
@@ -339,9 +341,10 @@ class Camera {
     }
     if (!settings_.clouds) return;
     auto* out = reinterpret_cast<float*>(cloud_.data.data());
-    for (int v = 0; v < HEIGHT; ++v) {
+    const int stride = settings_.stride;
+    for (int v = 0; v + stride <= HEIGHT; v += stride) {
       const auto y = static_cast<float>((v - CENTER_Y) / FOCAL);
-      for (int u = 0; u < WIDTH; ++u, out += 4) {
+      for (int u = 0; u + stride <= WIDTH; u += stride, out += 4) {
         const std::uint16_t depth = picture[WIDTH * v + u];
         const float z = depth == 0 ? std::numeric_limits<float>::quiet_NaN() : 0.001F * depth;
         out[0] = static_cast<float>((u - CENTER_X) / FOCAL) * z;
@@ -433,6 +436,8 @@ class Witness {
     out["map_age_s"] = sorted(map_ages_);
     out["latency_ms"] = sorted(latencies_ms_);
     out["step_ms"] = sorted(steps_ms_);
+    out["clearance_ms"] = sorted(clearances_ms_);
+    out["own_voxels_ms"] = sorted(own_voxels_ms_);  // of steps that took a map
     out["reasons"] = reasons_;
     out["scale_reasons"] = scale_reasons_;
     out["last"] = last_;
@@ -448,7 +453,7 @@ class Witness {
   std::size_t answers_ = 0, proved_ = 0, touching_expected_ = 0, touching_else_ = 0;
   ros::Time newest_;
   std::set<ros::Time> map_stamps_;
-  std::vector<double> map_ages_, scales_, latencies_ms_, steps_ms_;
+  std::vector<double> map_ages_, scales_, latencies_ms_, steps_ms_, clearances_ms_, own_voxels_ms_;
   std::map<std::string, std::size_t> reasons_, scale_reasons_;
   json last_;
 
@@ -502,10 +507,11 @@ class Witness {
     if (!is_open_ || !m.answered) return;
     latencies_ms_.push_back(1e3 * m.latency);
     steps_ms_.push_back(m.total_ms);
+    clearances_ms_.push_back(m.clearance_ms);
+    if (m.own_voxels_ms > 0) own_voxels_ms_.push_back(m.own_voxels_ms);
     last_ = {{"frames_received", m.frames_received}, {"frames_processed", m.frames_processed},
              {"frames_skipped", m.frames_skipped},   {"maps_received", m.maps_received},
-             {"maps_refused", m.maps_refused},       {"map_leaves", m.map_leaves},
-             {"clearance_ms", m.clearance_ms},       {"own_voxels_ms", m.own_voxels_ms}};
+             {"maps_refused", m.maps_refused},       {"map_leaves", m.map_leaves}};
   }
 };
 
@@ -609,6 +615,8 @@ int main(int argc, char** argv) {
   app.add_option("--flying-share", settings.flying_share, "of the pixels, along edges");
   app.add_option("--start-s", settings.start_s, "before it measures");
   app.add_option("--seconds", settings.seconds);
+  app.add_option("--stride", settings.stride, "of clouds: every so many pixels of every so many rows")
+      ->check(CLI::Range(1, 16));
   app.add_flag("--clouds", settings.clouds, "publish organised clouds");
   app.add_flag("--images", settings.images, "publish depth images");
   CLI11_PARSE(app, argc, argv);

@@ -6,9 +6,9 @@
 namespace dccd {
 namespace {
 
-// [1] of a voxel: cells in each of which all that is half a voxel from the surface is on the same side of it. Their
-// diagonal is 0.43 voxels.
-constexpr double INSIDE_CELL = 0.25;
+// Each way. Cells in each of which all that is half a voxel from the surface is on the same side of it: their diagonal
+// is 0.43 voxels.
+constexpr int CELLS_A_VOXEL = 4;
 // Cells that are remembered: some 8 MB.
 constexpr std::size_t MOST_REMEMBERED_CELLS = std::size_t{1} << 18;
 
@@ -68,7 +68,7 @@ void RigidShape::build(const MeshFrame& frame, double resolution_m) {
 
 bool RigidShape::holds(const Vec3& point) {
   if (!bounds_.contains(point)) return false;
-  const double cell_m = INSIDE_CELL * resolution_m_;
+  const double cell_m = resolution_m_ / CELLS_A_VOXEL;
   const Vec3 cell = ((point - bounds_.min()) / cell_m).array().floor();
   const bool has_number = (cell.array() < double{1 << 20}).all();
   const Vec3 middle = bounds_.min() + cell_m * (cell.array() + 0.5).matrix();
