@@ -136,6 +136,7 @@ Seen DepthPicture::look(const OctreeCube& cube) {
   }
   if (static_cast<double>(most) < nearest) return Seen::NONE;
   nearest_m_ = nearest;
+  farthest_m_ = farthest;
   const double side = square_px_ / farthest - 2 * off;
   const bool all_pass = is_inside && nearest > 0 && static_cast<double>(least) > farthest && side >= 1 &&
                         hole < std::min<double>(std::floor(side), MOST_HOLE) && away + radius <= geometry_.range;
@@ -153,9 +154,35 @@ Seen DepthPicture::look(const OctreeCube& cube) {
 
 bool DepthPicture::crosses(const OctreeCube& cube) const {
   if (passes(center_u_, center_v_, cube)) return true;
+  // In floats, of a voxel that is a little larger: which pixels may have rays that reach it. At which depth they enter
+  // and leave it follows from the ways that pixels look, without their points.
+  const double margin = 1e-3 + 2 * (geometry_.off_px + ROUNDING_PX) * farthest_m_ / square_px_;
+  float lo[3], hi[3], right[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::uint32_t key = axis == 0 ? cube.x : axis == 1 ? cube.y : cube.z;
+    lo[axis] = static_cast<float>(key - geometry_.sensor[axis] - margin);
+    hi[axis] = static_cast<float>(key - geometry_.sensor[axis] + 1 + margin);
+    right[axis] = static_cast<float>(pixel_ways_(axis, 0));
+  }
+  const float nearest = static_cast<float>(nearest_m_);
   for (std::int32_t v = area_.v0; v <= area_.v1; ++v) {
-    for (std::int32_t u = area_.u0; u <= area_.u1; ++u) {
-      if (passes(u, v, cube)) return true;
+    const float* const depths = &levels_[0].nearest[static_cast<std::size_t>(v) * levels_[0].width + area_.u0];
+    const Eigen::Vector3f first = (pixel_ways_ * Eigen::Vector3d(area_.u0, v, 1)).cast<float>();
+    const float first_x = first[0], first_y = first[1], first_z = first[2];
+    const auto reaches = [&](std::int32_t i) {
+      const float u = static_cast<float>(i);
+      const float x = 1 / (first_x + u * right[0]), y = 1 / (first_y + u * right[1]), z = 1 / (first_z + u * right[2]);
+      const float x0 = lo[0] * x, x1 = hi[0] * x, y0 = lo[1] * y, y1 = hi[1] * y, z0 = lo[2] * z, z1 = hi[2] * z;
+      const float enters = std::max(std::max(std::min(x0, x1), std::min(y0, y1)), std::min(z0, z1));
+      const float leaves = std::min(std::min(std::max(x0, x1), std::max(y0, y1)), std::max(z0, z1));
+      return static_cast<int>(enters <= leaves) & static_cast<int>(depths[i] > nearest) &
+             static_cast<int>(depths[i] >= enters);
+    };
+    const std::int32_t count = area_.u1 - area_.u0 + 1;
+    int any = 0;
+    for (std::int32_t i = 0; i < count; ++i) any |= reaches(i);
+    for (std::int32_t i = 0; any != 0 && i < count; ++i) {
+      if (reaches(i) != 0 && passes(area_.u0 + i, v, cube)) return true;
     }
   }
   return false;
@@ -185,7 +212,7 @@ bool DepthPicture::passes(std::int32_t u, std::int32_t v, const OctreeCube& cube
     from = std::max(from, enters);
     to = std::min(to, leaves);
   }
-  return from < to && from * end.norm() <= geometry_.range;
+  return from < to && from * from * end.squaredNorm() <= geometry_.range * geometry_.range;
 }
 
 }  // namespace dccd

@@ -57,8 +57,8 @@ class DepthPicture {
   std::array<Level, LEVELS> levels_;
   int level_count_ = 0;
   bool has_holes_ = false;
-  Area area_;             // of the cube that was looked at last
-  double nearest_m_ = 0;  // its depth
+  Area area_;  // of the cube that was looked at last
+  double nearest_m_ = 0, farthest_m_ = 0;
   std::int32_t center_u_ = 0, center_v_ = 0;
 
   void findHoles();
