@@ -166,6 +166,16 @@ def write_scaling(folder, result):
                 table(header, rows))
 
 
+def write_clouds(folder, result):
+    header = ["one thread, from bytes to the surface", "voxels", "best ms", "median ms", "required ms",
+              "octomap_server's loop, median ms", "times faster (quartiles)"]
+    rows = [[r["case"], str(r["voxels"]), "%.2f" % r["ms"]["best"], "%.2f" % r["ms"]["median"], "%g" % r["required_ms"],
+             "%.0f" % r["server_ms"]["median"] if "server_ms" in r else "",
+             "%(median).1f (%(quartile_1).1f to %(quartile_3).1f)" % r["ratio"] if "ratio" in r else ""] for r in result["runs"]]
+    write_rows(os.path.join(folder, "clouds.csv"), header, rows)
+    return save(folder, "clouds", "# Clouds to the map\n\n" + table(header, rows))
+
+
 def write_octomap(folder, result):
     header = ["case", "triangles", "voxels", "contacts", "best ms", "median ms", "required ms", "triangulated median ms",
               "ratio", "with --forget, median ms", "ratio to it (quartiles)"]

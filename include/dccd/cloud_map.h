@@ -33,7 +33,7 @@ struct Pinhole {
 };
 
 /// What a sensor saw at one moment, in its own frame. It names what must live until the answer.
-/// A depth, or a coordinate of a point, that is not a number says nothing. +inf (of a point: any infinite coordinate)
+/// A depth, or a coordinate of a point, that is not a number or -inf says nothing. +inf (of a point: any coordinate)
 /// is "no return". (0, 0, 0), and a depth of 0 or less, is no measurement.
 struct SensorView {
   Eigen::Isometry3d map_from_sensor = Eigen::Isometry3d::Identity();  ///< the sensor's place is its translation

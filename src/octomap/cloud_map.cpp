@@ -3,223 +3,120 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
-#include <unordered_map>
-#include <utility>
-#include <vector>
-
-#include <octomap/OcTree.h>
+#include <string>
 
 #include "octomap/leaf_lists.h"
 #include "octomap/map_builder.h"
+#include "octomap/octree_update.h"
+#include "octomap/view_reading.h"
 
 namespace dccd {
 namespace {
 
-using octomap::OcTreeKey;
-using octomap::point3d;
+// [bytes] As malloc hands it out: a node and its share of the list of its parent's children, of which there is one
+// where a node has no sibling; and of two lists of leaves, as long as one is made of the other.
+constexpr std::size_t NODE_BYTES = 112 + 2 * (sizeof(OccupiedLeaf) + 1);
+constexpr std::size_t MORE_NODES = 256;  // than UpdateLimits say, at most
 
-// [bytes] As malloc hands them out: a node and its share of the list of its parent's children, of which there is one
-// where a node has no sibling; a block of voxels among others.
-constexpr std::size_t NODE_BYTES = 112, BLOCK_BYTES = 48;
-
-/// Voxels, each once, as bits of blocks of 4^3: the rays of a camera go through the same ones again and again.
-class VoxelSet {
- public:
-  void add(const OcTreeKey& key) {
-    const std::uint64_t block = (key[0] >> 2) | std::uint64_t(key[1] >> 2) << 16 | std::uint64_t(key[2] >> 2) << 32;
-    Recent& recent = recent_[(block ^ block >> 12 ^ block >> 24) % RECENT];
-    if (block != recent.block) recent = {block, &blocks_[block]};
-    *recent.bits |= std::uint64_t{1} << cellBit(key[0], key[1], key[2]);
+OctomapCounts countsOf(const TreeLeaves& leaves, bool with_free) {
+  OctomapCounts counts{leaves.occupied.size(), leaves.free.size()};
+  NodeCounter occupied, known;
+  for (const OccupiedLeaf& leaf : leaves.occupied) occupied.add(leaf);
+  counts.occupied_nodes = occupied.count();
+  auto one = leaves.occupied.begin(), other = leaves.free.begin();
+  while (with_free && (one != leaves.occupied.end() || other != leaves.free.end())) {
+    const bool is_one = other == leaves.free.end() || (one != leaves.occupied.end() && codeOf(*one) < codeOf(*other));
+    known.add(is_one ? *one++ : *other++);
   }
-  /// Calls visit(key) for each that is not in `without`.
-  template <class Visit>
-  void forEach(const VoxelSet& without, Visit visit) const {
-    for (const auto& [block, all] : blocks_) {
-      const auto other = without.blocks_.find(block);
-      std::uint64_t bits = other == without.blocks_.end() ? all : all & ~other->second;
-      for (; bits != 0; bits &= bits - 1) {
-        const auto& cell = CELL_COORDINATES[lowestBit(bits)];
-        const auto key = [&](int axis) {
-          return static_cast<octomap::key_type>((block >> (16 * axis) & 0x3fff) << 2 | cell[axis]);
-        };
-        visit(OcTreeKey(key(0), key(1), key(2)));
-      }
-    }
-  }
-  std::size_t memoryBytes() const { return blocks_.size() * BLOCK_BYTES; }
+  counts.known_nodes = known.count();
+  return counts;
+}
 
- private:
-  /// A block that was used lately, found without a search: the elements of an unordered_map do not move.
-  struct Recent {
-    std::uint64_t block = ~std::uint64_t{0};
-    std::uint64_t* bits = nullptr;
-  };
-  static constexpr std::size_t RECENT = 4096;
-  std::unordered_map<std::uint64_t, std::uint64_t> blocks_;
-  std::vector<Recent> recent_ = std::vector<Recent>(RECENT);
+[[noreturn]] void noRoom(std::size_t max_bytes) {
+  throw OctomapError("the octree of all clouds needs more than the " + std::to_string(max_bytes >> 20) +
+                     " MB that it may take");
+}
+
+/// Where nothing is cleared.
+struct Blind {
+  Seen look(const OctreeCube&) const { return Seen::NONE; }
+  bool crosses(const OctreeCube&) const { return false; }
 };
-
-point3d pointOf(const Vec3& p) {
-  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
-}
-
-template <class Leaf>
-void walk(const octomap::OcTree& tree, const octomap::OcTreeNode& node, const OctreeCube& cube, Leaf& leaf) {
-  if (!tree.nodeHasChildren(&node)) return leaf(cube, tree.isNodeOccupied(node));
-  for (unsigned i = 0; i < 8; ++i) {
-    if (tree.nodeChildExists(&node, i)) walk(tree, *tree.getNodeChild(&node, i), cube.child(static_cast<int>(i)), leaf);
-  }
-}
 
 }  // namespace
 
 struct CloudMap::Impl {
-  CloudMapOptions options;
-  octomap::OcTree tree;
-  double fill_m, clear_m;  // how far away points fill, and rays clear
-  std::vector<OccupiedLeaf> doubtful;
-  octomap::KeyRay ray;
+  CloudTree tree;
+  ViewLimits limits;
+  KeyBox box;
+  TreeLeaves leaves;
+  ViewReader reader;
 
-  explicit Impl(const CloudMapOptions& of) : options(of), tree(of.resolution_m) {
-    fill_m = options.max_range_m > 0 ? options.max_range_m : std::numeric_limits<double>::infinity();
-    clear_m = std::min(fill_m, MOST_RAY_VOXELS * options.resolution_m);
+  explicit Impl(const CloudMapOptions& options) : tree(options.resolution_m) {
     tree.setProbHit(options.hit);
     tree.setProbMiss(options.miss);
     tree.setClampingThresMin(options.min);
     tree.setClampingThresMax(options.max);
+    limits.resolution_m = options.resolution_m;
+    limits.voxels_per_m = 1 / options.resolution_m;
+    limits.near_m = options.min_range_m;
+    limits.fill_m = options.max_range_m > 0 ? options.max_range_m : std::numeric_limits<double>::infinity();
+    limits.clear_m = std::min(limits.fill_m, MOST_RAY_VOXELS * options.resolution_m);
+    limits.no_return_clears = options.no_return_clears;
+    limits.lo.setConstant(-std::numeric_limits<double>::infinity());
+    limits.hi = -limits.lo;
+    if (options.box) {
+      constexpr double ROUNDING = 1e-6;  // a box's sides are often planes of the grid
+      limits.lo = (limits.voxels(options.box->min).array() + ROUNDING).floor();
+      limits.hi = (limits.voxels(options.box->max).array() - ROUNDING).ceil();
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lo[axis] = static_cast<std::int32_t>(std::clamp(limits.lo[axis], 0.0, 65536.0));
+      box.hi[axis] = static_cast<std::int32_t>(std::clamp(limits.hi[axis], 0.0, 65536.0)) - 1;
+    }
   }
 
-  /// False where the point lies outside of what a map can span. OctoMap's own call prints that, and casts doubles that
-  /// no int can hold.
-  bool keyOf(const point3d& point, OcTreeKey& key) const {
-    const double half_span_m = 32769 * tree.getResolution();
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      if (!(std::abs(point(axis)) < half_span_m)) return false;
-    }
-    return tree.coordToKeyChecked(point, key);
+  template <class Look>
+  void update(Look& look, std::size_t max_bytes) {
+    const std::size_t taken = reader.memoryBytes() + MORE_NODES * NODE_BYTES;
+    const std::size_t nodes = max_bytes > taken ? (max_bytes - taken) / NODE_BYTES : 0;
+    OctreeUpdate<Look> update(tree, leaves, reader.ends, look, {box, nodes});
+    leaves = update.run();
+    if (update.isFull()) noRoom(max_bytes);
   }
 };
 
 CloudMap::CloudMap(const CloudMapOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 CloudMap::~CloudMap() = default;
 
-std::size_t CloudMap::memoryBytes() const { return impl_->tree.size() * NODE_BYTES; }
-const std::vector<OccupiedLeaf>& CloudMap::doubtful() const { return impl_->doubtful; }
+std::size_t CloudMap::memoryBytes() const { return impl_->tree.size() * NODE_BYTES + impl_->reader.memoryBytes(); }
+
+const std::vector<OccupiedLeaf>& CloudMap::doubtful() const { return impl_->leaves.doubtful; }
 
 std::vector<std::int8_t> CloudMap::serialized(bool binary) const { return dccd::serialized(impl_->tree, binary); }
 
 SeenCounts CloudMap::insert(const SensorView& view, std::size_t max_bytes) {
-  octomap::OcTree& tree = impl_->tree;
-  const CloudMapOptions& options = impl_->options;
-  const Vec3 sensor = view.map_from_sensor.translation();
-  const point3d origin = pointOf(sensor);
-  OcTreeKey key;
-  const auto refuse = [&](const char* what, const Vec3& at) {
-    std::ostringstream text;
-    text << what << " (" << at.x() << ' ' << at.y() << ' ' << at.z() << ") m, beyond the 65536 voxels of "
-         << tree.getResolution() << " m that a map can span";
-    throw OctomapError(text.str());
-  };
-  if (!impl_->keyOf(origin, key)) refuse("the sensor is at", sensor);
-  VoxelSet free, occupied;
-  const auto checkRoom = [&] {
-    if (memoryBytes() + free.memoryBytes() + occupied.memoryBytes() <= max_bytes) return;
-    throw OctomapError("the octree of all clouds needs more than the " + std::to_string(max_bytes >> 20) +
-                       " MB that it may take");
-  };
-  SeenCounts counts;
-  counts.is_picture = view.depth_m != nullptr;
-  counts.cleared = view.clears;
-  counts.no_return_cleared = view.clears && options.no_return_clears && counts.is_picture;
-  const auto isInBox = [&](const Vec3& p) {
-    return !options.box ||
-           ((p.array() >= options.box->min.array()).all() && (p.array() <= options.box->max.array()).all());
-  };
-  std::vector<Vec3> fills;
-  std::vector<std::pair<Vec3, bool>> rays;
-  for (std::size_t i = 0; i < view.width * view.height; ++i) {
-    Vec3 p;
-    if (view.depth_m) {
-      const Pinhole& lens = view.pinhole;
-      const double z = static_cast<double>(view.depth_m[i]);
-      const Vec3 way((static_cast<double>(i % view.width) - lens.cx) / lens.fx,
-                     (static_cast<double>(i / view.width) - lens.cy) / lens.fy, 1);
-      if (!(z > 0)) {
-        ++(z <= 0 && std::isfinite(z) ? counts.near : counts.nothing);
-        continue;
-      }
-      if (std::isinf(z)) {
-        ++counts.no_return;
-        if (counts.no_return_cleared) rays.emplace_back(view.map_from_sensor * (way * (2 * impl_->clear_m)), false);
-        continue;
-      }
-      p = way * z;
-    } else {
-      p = Vec3(view.xyz[3 * i], view.xyz[3 * i + 1], view.xyz[3 * i + 2]);
-      if (!p.allFinite()) {
-        ++(p.array().isInf().any() ? counts.no_return : counts.nothing);
-        continue;
-      }
-    }
-    const double depth = p.norm();
-    if (p.isZero(0) || depth < options.min_range_m) {
-      ++counts.near;
-      continue;
-    }
-    const Vec3 at = view.map_from_sensor * p;
-    const bool is_far = depth > impl_->fill_m, is_in = isInBox(at);
-    ++(is_far ? counts.far : is_in ? counts.filled : counts.outside);
-    if (!is_far && is_in) {
-      if (!impl_->keyOf(pointOf(at), key)) refuse("a point lies at", at);
-      fills.push_back(at);
-    }
-    rays.emplace_back(at, depth <= impl_->clear_m);
+  const SeenCounts counts = impl_->reader.read(view, impl_->limits, max_bytes / 2);
+  if (impl_->reader.passed.isFull()) noRoom(max_bytes);
+  Blind blind;
+  if (!counts.cleared) {
+    impl_->update(blind, max_bytes);
+  } else if (counts.is_picture) {
+    impl_->update(impl_->reader.picture, max_bytes);
+  } else {
+    impl_->update(impl_->reader.passed, max_bytes);
   }
-  for (const Vec3& p : fills) {
-    if (impl_->keyOf(pointOf(p), key)) occupied.add(key);
-  }
-  for (const auto& [to, ends] : rays) {
-    if (!view.clears) break;
-    const point3d end = ends ? pointOf(to) : pointOf(sensor + (to - sensor).normalized() * impl_->clear_m);
-    if (!impl_->keyOf(end, key) || !tree.computeRayKeys(origin, end, impl_->ray)) continue;
-    for (const OcTreeKey& passed : impl_->ray) free.add(passed);
-    if (!ends) free.add(key);
-    checkRoom();
-  }
-  std::vector<std::pair<std::uint64_t, OccupiedLeaf>> doubtful;
-  for (const OccupiedLeaf& leaf : impl_->doubtful) doubtful.emplace_back(codeOf(leaf), leaf);
-  const auto update = [&](bool is_occupied) {
-    return [&, is_occupied](const OcTreeKey& voxel) {
-      if (options.box &&
-          !isInBox(Vec3(tree.keyToCoord(voxel[0]), tree.keyToCoord(voxel[1]), tree.keyToCoord(voxel[2]))))
-        return;
-      const octomap::OcTreeNode* node = tree.updateNode(voxel, is_occupied);
-      const OccupiedLeaf leaf{{voxel[0], voxel[1], voxel[2]}, 1};
-      const std::uint64_t code = codeOf(leaf);
-      doubtful.erase(std::remove_if(doubtful.begin(), doubtful.end(), [&](const auto& d) { return d.first == code; }),
-                     doubtful.end());
-      if (is_occupied && !tree.isNodeOccupied(node)) doubtful.emplace_back(code, leaf);
-      checkRoom();
-    };
-  };
-  free.forEach(occupied, update(false));
-  occupied.forEach({}, update(true));
-  std::sort(doubtful.begin(), doubtful.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  impl_->doubtful.clear();
-  for (const auto& [code, leaf] : doubtful) impl_->doubtful.push_back(leaf);
   return counts;
 }
 
 DecodedOctomap CloudMap::leaves(const OctomapLimits& limits) const {
-  const octomap::OcTree& tree = impl_->tree;
   DecodedOctomap map;
-  map.resolution_m = tree.getResolution();
-  map.id = tree.getTreeType();
-  const auto walkAll = [&](auto&& leaf) {
-    if (tree.getRoot()) walk(tree, *tree.getRoot(), OctreeCube(), leaf);
-  };
-  listLeaves(walkAll, limits, map);
+  map.resolution_m = impl_->tree.getResolution();
+  map.id = impl_->tree.getTreeType();
+  const TreeLeaves& leaves = impl_->leaves;
+  checkLimits(countsOf(leaves, limits.free_leaves), limits);
+  map.occupied = leaves.occupied;
+  if (limits.free_leaves) map.free = leaves.free;
   return map;
 }
 

@@ -85,7 +85,7 @@ void walkBinary(Bytes& bytes, const Cube& cube, Leaf& leaf) {
     leaf(cube, false);  // an inner node without children: liboctomap takes it for free
     return;
   }
-  for (int i = 0; i < 8; ++i) {
+  for (unsigned i = 0; i < 8; ++i) {
     const unsigned state = children >> (2 * i) & 3;
     if (state == 1 || state == 2) {
       checkDepth(cube, bytes);
@@ -113,7 +113,7 @@ void walkFull(Bytes& bytes, const Cube& cube, std::size_t extra, Leaf& leaf) {
     return;
   }
   checkDepth(cube, bytes);
-  for (int i = 0; i < 8; ++i) {
+  for (unsigned i = 0; i < 8; ++i) {
     if (children >> i & 1) walkFull(bytes, cube.child(i), extra, leaf);
   }
 }

@@ -1,12 +1,12 @@
-// Clouds to one map: held against liboctomap's own insertion, and against rays that can be counted by hand.
+// What sensors see, to one map: views whose rays can be counted by hand. cloud_map_rays_test.cpp has the others.
 #include "dccd/cloud_map.h"
 #include "support/said.h"
+#include "support/seen_scene.h"
 
 #include <gtest/gtest.h>
-#include <octomap/OcTree.h>
 
+#include <algorithm>
 #include <random>
-#include <sstream>
 
 namespace dccd {
 namespace {
@@ -47,63 +47,6 @@ Positions someCloud(std::mt19937& random, const Vec3& sensor) {
   return points;
 }
 
-bool same(const std::vector<OccupiedLeaf>& a, const std::vector<OccupiedLeaf>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const OccupiedLeaf& x, const OccupiedLeaf& y) {
-    return !(x.min < y.min) && !(y.min < x.min) && x.size == y.size;
-  });
-}
-
-DecodedOctomap decoded(octomap::OcTree& tree) {
-  std::ostringstream stream;
-  tree.writeData(stream);
-  const std::string bytes = stream.str();
-  OctomapFields fields;
-  fields.id = "OcTree";
-  fields.resolution = tree.getResolution();
-  fields.binary = false;
-  fields.data = bytes.data();
-  fields.size = bytes.size();
-  return decodeOctomap(fields);
-}
-
-TEST(CloudMap, IsWhatLiboctomapMakesOfTheSameClouds) {
-  std::mt19937 random(7);
-  for (const double range_m : {0.0, 1.7}) {
-    CloudMapOptions options;
-    options.resolution_m = 0.04;
-    options.max_range_m = range_m;
-    CloudMap map(options);
-    octomap::OcTree tree(options.resolution_m);
-    tree.setProbHit(0.7);
-    tree.setProbMiss(0.4);
-    tree.setClampingThresMin(0.12);
-    tree.setClampingThresMax(0.97);
-    for (int i = 0; i < 6; ++i) {
-      const Vec3 sensor(0.01 * i, 0.3, 1 - 0.03 * i);
-      const Positions points = someCloud(random, sensor);
-      octomap::Pointcloud cloud;
-      for (const Vec3& p : points) {
-        cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
-      }
-      const octomap::point3d origin(static_cast<float>(sensor.x()), static_cast<float>(sensor.y()),
-                                    static_cast<float>(sensor.z()));
-      tree.insertPointCloud(cloud, origin, range_m > 0 ? range_m : -1);
-      insert(map, sensor, points);
-      const DecodedOctomap expected = decoded(tree), found = map.leaves();
-      ASSERT_TRUE(same(found.occupied, expected.occupied)) << "cloud " << i << ", range " << range_m;
-      ASSERT_TRUE(same(found.free, expected.free)) << "cloud " << i << ", range " << range_m;
-      ASSERT_GT(found.occupied.size(), 100u);
-      ASSERT_GE(map.memoryBytes(), tree.memoryUsage());
-      for (const bool binary : {true, false}) {
-        std::ostringstream stream;
-        ASSERT_TRUE(static_cast<bool>(binary ? tree.writeBinaryData(stream) : tree.writeData(stream)));
-        const std::vector<std::int8_t> bytes = map.serialized(binary);
-        ASSERT_EQ(std::string(bytes.begin(), bytes.end()), stream.str()) << "cloud " << i << ", range " << range_m;
-      }
-    }
-  }
-}
-
 TEST(CloudMap, ARayClearsUpToThePointThatItFills) {
   CloudMap map(tenCentimetres());
   insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}});
@@ -119,11 +62,11 @@ TEST(CloudMap, WhatLiesBeyondTheRangeOnlyClears) {
   CloudMapOptions options = tenCentimetres();
   options.max_range_m = 0.5;
   CloudMap map(options);
-  insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}});
+  EXPECT_EQ(insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}}).far, 1u);
   const DecodedOctomap found = map.leaves();
   EXPECT_TRUE(found.occupied.empty());
-  ASSERT_EQ(found.free.size(), 5u);
-  EXPECT_EQ(found.free.back().min.x, 32768 + 4);
+  ASSERT_EQ(found.free.size(), 6u);  // with the voxel in which it is clipped
+  EXPECT_EQ(found.free.back().min.x, 32768 + 5);
 }
 
 TEST(CloudMap, AVoxelIsClearedAsSoonAsTheModelSaysSo) {
@@ -151,26 +94,174 @@ TEST(CloudMap, APointWinsOverTheRaysOfTheSameCloud) {
   EXPECT_EQ(map.leaves().occupied.size(), 3u);
 }
 
-TEST(CloudMap, WhatNoMapCanSpanIsLeftOutOrRefused) {
+bool isOccupied(const CloudMap& map, const Vec3& at) {
+  const std::vector<OccupiedLeaf> occupied = map.leaves().occupied;
+  return std::any_of(occupied.begin(), occupied.end(), [&](const OccupiedLeaf& leaf) {
+    return leaf.min.x == keyOf(at.x()) && leaf.min.y == keyOf(at.y()) && leaf.min.z == keyOf(at.z());
+  });
+}
+
+TEST(CloudMap, AVoxelAtTheRangeIsClearedByThreeLooksThroughIt) {
+  // A wall at 1.999 m of 2 m, which goes away: the clipped ends of the rays behind it lie in its voxels.
+  CloudMapOptions options;
+  options.resolution_m = 0.02;
+  options.max_range_m = 2;
+  CloudMap map(options);
+  constexpr std::size_t WIDTH = 64, HEIGHT = 48;
+  const Pinhole lens{60, 60, 31.5, 23.5};
+  std::vector<float> depths;
+  const auto look = [&](double away_m) {
+    depths.clear();
+    for (std::size_t v = 0; v < HEIGHT; ++v) {
+      for (std::size_t u = 0; u < WIDTH; ++u) {
+        const Vec3 way((double(u) - lens.cx) / lens.fx, (double(v) - lens.cy) / lens.fy, 1);
+        depths.push_back(static_cast<float>(away_m / way.norm()));
+      }
+    }
+    return map.insert(test::viewOf(Eigen::Isometry3d::Identity(), depths, lens, WIDTH), PLENTY);
+  };
+  EXPECT_EQ(look(1.999).filled, WIDTH * HEIGHT);
+  EXPECT_GT(map.leaves().occupied.size(), 2000u);
+  for (int looks = 0; looks < 3; ++looks) {
+    EXPECT_FALSE(map.leaves().occupied.empty());
+    EXPECT_EQ(look(4).far, WIDTH * HEIGHT);
+  }
+  EXPECT_TRUE(map.leaves().occupied.empty());
+  EXPECT_TRUE(map.doubtful().empty());
+}
+
+TEST(CloudMap, APointThatIsNoMeasurementFillsAndClearsNothing) {
+  CloudMapOptions options = tenCentimetres();
+  options.min_range_m = 0.3;
+  CloudMap map(options);
+  const Vec3 sensor(0.05, 0.05, 0.05);
+  const SeenCounts counts = insert(map, sensor, {sensor, {0.25, 0.05, 0.05}, {0.05, 0.95, 0.05}});
+  EXPECT_EQ(counts.near, 2u);
+  EXPECT_EQ(counts.filled, 1u);
+  EXPECT_EQ(map.leaves().occupied.size(), 1u);
+  EXPECT_EQ(map.leaves().free.size(), 9u);
+  const std::vector<float> depths{0, -1, 0.2f, 0.9f};
+  EXPECT_EQ(map.insert(test::viewOf(Eigen::Isometry3d::Identity(), depths, {1, 1, 0, 0}, 2), PLENTY).near, 3u);
+}
+
+TEST(CloudMap, NoReturnClearsUpToTheRangeIfAsked) {
+  const std::vector<float> depths(64 * 48, std::numeric_limits<float>::infinity());
+  for (const bool clears : {false, true}) {
+    CloudMapOptions options = tenCentimetres();
+    options.max_range_m = 1;
+    options.no_return_clears = clears;
+    CloudMap map(options);
+    insert(map, Vec3::Zero(), {{0.05, 0.05, 0.75}});
+    for (int looks = 0; looks < 3; ++looks) {
+      const SeenCounts counts =
+          map.insert(test::viewOf(Eigen::Isometry3d::Identity(), depths, {60, 60, 31, 23}, 64), PLENTY);
+      EXPECT_EQ(counts.no_return, depths.size());
+      EXPECT_EQ(counts.no_return_cleared, clears);
+    }
+    EXPECT_EQ(map.leaves().occupied.empty(), clears);
+  }
+}
+
+TEST(CloudMap, APointInFreeSpaceIsDoubtfulUntilItIsOccupiedOrSeenThrough) {
+  CloudMap map(tenCentimetres());
+  const Vec3 sensor(0.05, 0.05, 0.05), far(0.95, 0.05, 0.05), near(0.45, 0.05, 0.05);
+  for (int looks = 0; looks < 6; ++looks) insert(map, sensor, {far});
+  for (int looks = 0; looks < 3; ++looks) {  // of something that stays
+    insert(map, sensor, {near});
+    EXPECT_EQ(isOccupied(map, near), looks == 2) << looks;
+    ASSERT_EQ(map.doubtful().size(), looks == 2 ? 0u : 1u) << looks;
+    if (looks < 2) {
+      EXPECT_EQ(map.doubtful()[0].min.x, keyOf(near.x()));
+    }
+  }
+  for (int looks = 0; looks < 6; ++looks) insert(map, sensor, {far});
+  insert(map, sensor, {near});
+  EXPECT_EQ(map.doubtful().size(), 1u);
+  insert(map, sensor, {{0.05, 0.95, 0.05}});  // says nothing of it
+  EXPECT_EQ(map.doubtful().size(), 1u);
+  insert(map, sensor, {far});
+  EXPECT_TRUE(map.doubtful().empty());
+}
+
+TEST(CloudMap, WhatIsOutsideOfTheBoxStaysUnknown) {
+  CloudMapOptions options = tenCentimetres();
+  options.box = Box{Vec3(0.3, -1, -1), Vec3(0.6, 1, 1)};
+  CloudMap map(options);
+  const SeenCounts counts =
+      insert(map, {0.05, 0.05, 0.05}, {{0.95, 0.05, 0.05}, {0.05, 0.45, 0.05}, {0.45, 0.25, 0.05}});
+  EXPECT_EQ(counts.outside, 2u);
+  EXPECT_EQ(counts.filled, 1u);
+  for (const OccupiedLeaf& leaf : map.leaves().free) {
+    EXPECT_GE(leaf.min.x, 32768 + 3);
+    EXPECT_LE(leaf.min.x, 32768 + 5);
+  }
+  EXPECT_EQ(map.leaves().free.size(), 5u);
+  EXPECT_EQ(map.leaves().occupied.size(), 1u);
+}
+
+TEST(CloudMap, WhatDoesNotClearFillsAllTheSame) {
+  CloudMap map(tenCentimetres());
+  const std::vector<float> xyz{0, 0, 0.55f};
+  SensorView view = test::viewOf(Eigen::Isometry3d::Identity(), xyz);
+  view.clears = false;
+  EXPECT_FALSE(map.insert(view, PLENTY).cleared);
+  EXPECT_TRUE(map.leaves().free.empty());
+  EXPECT_EQ(map.leaves().occupied.size(), 1u);
+}
+
+TEST(CloudMap, WhatNoMapCanSpanIsRefusedByName) {
   CloudMap map(tenCentimetres());  // +- 3276.8 m
   testing::internal::CaptureStderr();
-  insert(map, {3276, 0, 0}, {{3277, 0, 0}, {3276, 1e30, 0}, {-1e300, 0, 0}, {3276.55, 0, 0}});
+  EXPECT_EQ(test::said<OctomapError>([&] {
+              insert(map, {3276, 0, 0}, {{3276.55, 0, 0}, {3277, 0, 0}});
+            }),
+            "a point lies at (3277 0 0) m, beyond the 65536 voxels of 0.1 m that a map can span");
+  EXPECT_EQ(test::said<OctomapError>([&] {
+              insert(map, {0, -500000, 0}, {{3276, 0, 0}});
+            }),
+            "the sensor is at (0 -500000 0) m, beyond the 65536 voxels of 0.1 m that a map can span");
+  EXPECT_THROW(insert(map, {0, 0, 0}, {{3276, 1e30, 0}}), OctomapError);
+  EXPECT_TRUE(map.leaves().occupied.empty());
+  EXPECT_TRUE(map.leaves().free.empty());
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "OctoMap complains on the console";
-  EXPECT_EQ(map.leaves().occupied.size(), 1u);
-  EXPECT_THROW(insert(map, {3277, 0, 0}, {{3276, 0, 0}}), OctomapError);
-  EXPECT_THROW(insert(map, {1e300, 0, 0}, {{3276, 0, 0}}), OctomapError);
+  CloudMapOptions options = tenCentimetres();
+  options.max_range_m = 10;
+  CloudMap near(options);
+  EXPECT_EQ(insert(near, {3276, 0, 0}, {{3297, 0, 0}}).far, 1u);
 }
 
 TEST(CloudMap, NeedsNoMoreThanItMay) {
   std::mt19937 random(7);
   CloudMapOptions options;
   options.resolution_m = 0.005;
-  CloudMap map(options);
-  const std::size_t limit = std::size_t{2} << 20;
   const Positions points = someCloud(random, Vec3::Zero());
-  const std::string text = test::said<OctomapError>([&] { insert(map, Vec3::Zero(), points, limit); });
-  EXPECT_EQ(text, "the octree of all clouds needs more than the 2 MB that it may take");
-  EXPECT_LE(map.memoryBytes(), limit);
+  std::vector<float> depths(64 * 48, 1.2f);
+  for (float& depth : depths) depth += 0.2f * static_cast<float>(random() % 3);
+  for (const bool is_picture : {false, true}) {
+    CloudMap map(options);
+    const std::size_t limit = std::size_t{4} << 20;
+    const std::string text = test::said<OctomapError>([&] {
+      if (is_picture) {
+        map.insert(test::viewOf(Eigen::Isometry3d::Identity(), depths, {60, 60, 31, 23}, 64), limit);
+      } else {
+        insert(map, Vec3::Zero(), points, limit);
+      }
+    });
+    EXPECT_EQ(text, "the octree of all clouds needs more than the 4 MB that it may take");
+    EXPECT_LE(map.memoryBytes(), limit);
+    // What is in it is listed.
+    const std::vector<std::int8_t> bytes = map.serialized(false);
+    OctomapFields fields;
+    fields.id = "OcTree";
+    fields.resolution = options.resolution_m;
+    fields.binary = false;
+    fields.data = bytes.data();
+    fields.size = bytes.size();
+    const DecodedOctomap decoded = decodeOctomap(fields), leaves = map.leaves();
+    EXPECT_EQ(decoded.occupied.size(), leaves.occupied.size());
+    EXPECT_EQ(decoded.free.size(), leaves.free.size());
+    EXPECT_EQ(leaves.free.empty(), !is_picture) << "before the octree is changed, or in the middle";
+  }
 }
 
 }  // namespace

@@ -1,0 +1,191 @@
+#include "octomap/depth_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dccd {
+namespace {
+
+constexpr float NOWHERE = std::numeric_limits<float>::infinity();
+constexpr double SQRT2 = 1.4142135623730951, SQRT3 = 1.7320508075688772;
+// Of a coordinate, of a depth as a float, and of a pixel: more than what the numbers cannot tell.
+constexpr double ROUNDING = 1e-9, DEPTH_ROUNDING = 1e-6, ROUNDING_PX = 1e-3;
+
+}  // namespace
+
+float* DepthPicture::depths(std::size_t width, std::size_t height) {
+  Level& all = levels_[0];
+  all.width = static_cast<std::int32_t>(width);
+  all.height = static_cast<std::int32_t>(height);
+  all.nearest.resize(width * height);
+  return all.nearest.data();
+}
+
+std::size_t DepthPicture::memoryBytes() const {
+  std::size_t bytes = 0;
+  for (const Level& level : levels_) {
+    bytes += (level.nearest.capacity() + level.farthest.capacity()) * sizeof(float) + level.hole.capacity();
+  }
+  return bytes;
+}
+
+void DepthPicture::build(const PictureGeometry& geometry) {
+  geometry_ = geometry;
+  Eigen::Matrix3d lens;
+  lens << geometry.fx, 0, geometry.cx, 0, geometry.fy, geometry.cy, 0, 0, 1;
+  const Eigen::Vector3d focal(geometry.fx, geometry.fy, 1);
+  project_ = focal.asDiagonal() * geometry.camera_from_map * geometry.resolution_m;
+  spread_ = project_.cwiseAbs().rowwise().sum();
+  pixel_ways_ = geometry.camera_from_map.transpose() * lens.inverse() / geometry.resolution_m;
+  square_px_ = std::min(geometry.fx, geometry.fy) * geometry.resolution_m / SQRT2;  // of the ball in it
+  findHoles();
+  level_count_ = 1;
+  while (levels_[level_count_ - 1].width > 1 || levels_[level_count_ - 1].height > 1) {
+    reduce(levels_[level_count_ - 1], levels_[level_count_], level_count_ == 1);
+    ++level_count_;
+  }
+}
+
+/// Of each pixel the side of the largest square of pixels that say nothing which begins there, down and to the right.
+void DepthPicture::findHoles() {
+  Level& all = levels_[0];
+  has_holes_ = false;
+  for (const float depth : all.nearest) has_holes_ = has_holes_ || std::isnan(depth);
+  if (!has_holes_) return;
+  all.hole.resize(all.nearest.size());
+  for (std::int32_t v = all.height - 1; v >= 0; --v) {
+    const std::size_t row = static_cast<std::size_t>(v) * all.width;
+    const std::uint8_t* below = v + 1 < all.height ? &all.hole[row + all.width] : nullptr;
+    std::uint8_t right = 0;
+    for (std::int32_t u = all.width - 1; u >= 0; --u) {
+      std::uint8_t side = 0;
+      if (std::isnan(all.nearest[row + u])) {
+        const std::uint8_t beside = below && u + 1 < all.width ? std::min(right, std::min(below[u], below[u + 1])) : 0;
+        side = static_cast<std::uint8_t>(std::min(MOST_HOLE, beside + 1));
+      }
+      all.hole[row + u] = right = side;
+    }
+  }
+}
+
+void DepthPicture::reduce(const Level& from, Level& to, bool is_first) const {
+  to.width = (from.width + 1) / 2;
+  to.height = (from.height + 1) / 2;
+  const std::size_t size = static_cast<std::size_t>(to.width) * to.height;
+  to.nearest.resize(size);
+  to.farthest.resize(size);
+  to.hole.resize(has_holes_ ? size : 0);
+  const std::vector<float>& farthest = is_first ? from.nearest : from.farthest;
+  for (std::int32_t v = 0; v < to.height; ++v) {
+    const std::size_t row = static_cast<std::size_t>(2 * v) * from.width, out = static_cast<std::size_t>(v) * to.width;
+    const std::size_t below = 2 * v + 1 < from.height ? row + from.width : row;
+    const auto square = [&](const auto* values, std::int32_t u, auto start, const auto& better) {
+      const std::int32_t left = 2 * u, right = std::min(left + 1, from.width - 1);
+      auto best = start;  // what is not a number is never better
+      for (const auto value : {values[row + left], values[row + right], values[below + left], values[below + right]}) {
+        best = better(value, best) ? value : best;
+      }
+      return best;
+    };
+    for (std::int32_t u = 0; u < to.width; ++u) {
+      to.nearest[out + u] = square(from.nearest.data(), u, NOWHERE, [](float a, float b) { return a < b; });
+      to.farthest[out + u] = square(farthest.data(), u, -NOWHERE, [](float a, float b) { return a > b; });
+    }
+    for (std::int32_t u = 0; has_holes_ && u < to.width; ++u) {
+      to.hole[out + u] = square(from.hole.data(), u, std::uint8_t{0}, [](int a, int b) { return a > b; });
+    }
+  }
+}
+
+Seen DepthPicture::look(const OctreeCube& cube) {
+  const Level& all = levels_[0];
+  const double half = 0.5 * cube.size();
+  const Eigen::Vector3d center = Eigen::Vector3d(cube.x + half, cube.y + half, cube.z + half) - geometry_.sensor;
+  const Eigen::Vector3d at = project_ * center, reach = half * spread_;
+  const double margin = DEPTH_ROUNDING * (std::abs(at[2]) + reach[2]);
+  const double nearest = at[2] - reach[2] - margin, farthest = at[2] + reach[2] + margin;
+  const double away = center.norm(), radius = SQRT3 * half;
+  if (farthest <= 0 || away - radius > geometry_.range) return Seen::NONE;
+  const double of_near = nearest > 0 ? 1 / nearest : std::numeric_limits<double>::infinity(), of_far = 1 / farthest;
+  const double off = geometry_.off_px + ROUNDING_PX;
+  const auto pixels = [&](int axis, double middle, std::int32_t count, std::int32_t& first, std::int32_t& last) {
+    const double lo = at[axis] - reach[axis], hi = at[axis] + reach[axis];
+    const double from = middle + lo * (lo >= 0 ? of_far : of_near) - off;
+    const double to = middle + hi * (hi >= 0 ? of_near : of_far) + off;
+    first = from > 0 ? static_cast<std::int32_t>(std::min<double>(std::ceil(from), count)) : 0;
+    last = to < count - 1 ? static_cast<std::int32_t>(std::max<double>(std::floor(to), -1)) : count - 1;
+    return from >= 0 && to <= count - 1;
+  };
+  const bool is_inside =
+      pixels(0, geometry_.cx, all.width, area_.u0, area_.u1) & pixels(1, geometry_.cy, all.height, area_.v0, area_.v1);
+  if (area_.u0 > area_.u1 || area_.v0 > area_.v1) return Seen::NONE;
+  int level = 0;
+  while (((area_.u1 >> level) - (area_.u0 >> level)) > 2 || ((area_.v1 >> level) - (area_.v0 >> level)) > 2) ++level;
+  const Level& squares = levels_[level];
+  const float* const last = level == 0 ? squares.nearest.data() : squares.farthest.data();
+  float least = NOWHERE, most = -NOWHERE;
+  int hole = 0;
+  for (std::int32_t v = area_.v0 >> level; v <= area_.v1 >> level; ++v) {
+    const std::size_t row = static_cast<std::size_t>(v) * squares.width;
+    for (std::int32_t u = area_.u0 >> level; u <= area_.u1 >> level; ++u) {
+      least = squares.nearest[row + u] < least ? squares.nearest[row + u] : least;
+      most = last[row + u] > most ? last[row + u] : most;
+      if (has_holes_) hole = std::max<int>(hole, squares.hole[row + u]);
+    }
+  }
+  if (static_cast<double>(most) < nearest) return Seen::NONE;
+  nearest_m_ = nearest;
+  const double side = square_px_ / farthest - 2 * off;
+  const bool all_pass = is_inside && nearest > 0 && static_cast<double>(least) > farthest && side >= 1 &&
+                        hole < std::min<double>(std::floor(side), MOST_HOLE) && away + radius <= geometry_.range;
+  if (all_pass) return Seen::ALL;
+  const auto inside = [&](int axis, double middle, std::int32_t lo, std::int32_t hi) {
+    const double to = at[2] > 0 ? middle + at[axis] / at[2] : 0.5 * (lo + hi);
+    return static_cast<std::int32_t>(std::lrint(std::clamp<double>(to, lo, hi)));
+  };
+  if (cube.size() == 1) {
+    center_u_ = inside(0, geometry_.cx, area_.u0, area_.u1);
+    center_v_ = inside(1, geometry_.cy, area_.v0, area_.v1);
+  }
+  return Seen::SOME;
+}
+
+bool DepthPicture::crosses(const OctreeCube& cube) const {
+  if (passes(center_u_, center_v_, cube)) return true;
+  for (std::int32_t v = area_.v0; v <= area_.v1; ++v) {
+    for (std::int32_t u = area_.u0; u <= area_.u1; ++u) {
+      if (passes(u, v, cube)) return true;
+    }
+  }
+  return false;
+}
+
+/// Whether the ray of the pixel goes through the voxel, in which it does not end.
+bool DepthPicture::passes(std::int32_t u, std::int32_t v, const OctreeCube& cube) const {
+  const Level& all = levels_[0];
+  const std::size_t pixel = static_cast<std::size_t>(v) * all.width + u;
+  const float depth = all.nearest[pixel];
+  if (!(static_cast<double>(depth) > nearest_m_)) return false;
+  Eigen::Vector3d end;
+  if (geometry_.xyz && depth < NOWHERE) {
+    const float* p = geometry_.xyz + 3 * pixel;
+    end = geometry_.map_from_xyz * Eigen::Vector3d(p[0], p[1], p[2]);
+  } else {
+    end =
+        pixel_ways_ * Eigen::Vector3d(u, v, 1) * std::min<double>(depth, 2 * geometry_.range * geometry_.resolution_m);
+  }
+  const double lo[3] = {cube.x - geometry_.sensor.x(), cube.y - geometry_.sensor.y(), cube.z - geometry_.sensor.z()};
+  double from = 0, to = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double margin = DEPTH_ROUNDING * (1 + std::abs(lo[axis]));
+    const double inverse = 1 / end[axis];  // infinite: then both are beyond, or on both sides
+    double enters = (lo[axis] + margin) * inverse, leaves = (lo[axis] + 1 - margin) * inverse;
+    if (enters > leaves) std::swap(enters, leaves);
+    from = std::max(from, enters);
+    to = std::min(to, leaves);
+  }
+  return from < to && from * end.norm() <= geometry_.range;
+}
+
+}  // namespace dccd
