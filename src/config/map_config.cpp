@@ -31,7 +31,8 @@ CloudSource readCloudSource(ParameterReader entry) {
 /// Of each sensor the topic alone, or with what else there is to say of it.
 void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
   const char* const name = "obstacle_cloud_topics";
-  if (!reader.has(name)) return;
+  const std::vector<ParameterTree> items = reader.list("obstacle_cloud_topics");
+  if (items.empty()) return;
   for (const char* single : {"obstacle_cloud_topic", "obstacle_camera_info_topic", "obstacle_sensor_frame"}) {
     if (reader.has(single)) {
       reader.fail(single, std::string("has no place beside ") + name +
@@ -40,7 +41,7 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
   }
   config.clouds.clear();
   std::set<std::string> topics;
-  for (const ParameterTree& item : reader.list("obstacle_cloud_topics")) {
+  for (const ParameterTree& item : items) {
     const std::string path = reader.path() + name + "/" + std::to_string(config.clouds.size()) + "/";
     ParameterTree entry = item;
     if (item.kind == ParameterTree::Kind::TEXT) {
@@ -51,7 +52,6 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
     const std::string& topic = config.clouds.back().topic;
     if (!topics.insert(topic).second) reader.fail(name, "has '" + topic + "' twice; remove one of the two");
   }
-  if (config.clouds.empty()) reader.fail(name, "is empty; remove it, or name the clouds' topics");
   if (config.clouds.size() > MOST_CLOUD_TOPICS) {
     reader.fail(name, "has " + std::to_string(config.clouds.size()) + " entries, more than " +
                           std::to_string(MOST_CLOUD_TOPICS));

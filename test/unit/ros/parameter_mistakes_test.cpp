@@ -104,7 +104,6 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"obstacle_resolution_m: 0.0005, obstacle_max_range_m: 5.0",
        "~obstacle_resolution_m is 0.0005, too fine for obstacle_max_range_m 5: a ray has 4096 voxels at most; write at "
        "least 0.0012207"},
-      {"obstacle_cloud_topics: []", "~obstacle_cloud_topics is empty; remove it, or name the clouds' topics"},
       {"obstacle_cloud_topics: [/a, {topic: /a}]", "~obstacle_cloud_topics has '/a' twice"},
       {"obstacle_cloud_topics: [{frame: /a}]", "~obstacle_cloud_topics/0/"},
       {"obstacle_cloud_topics: [/a], obstacle_sensor_frame: b",
