@@ -224,7 +224,7 @@ struct Outcome : Findings {
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
-  std::size_t substeps = 0;            ///< parts that the step was cut into
+  std::size_t substeps = 0;                                                  ///< parts that the step was cut into
   Touching touching = Touching::NONE;  ///< as if no patches were tracked; Assurance::touching holds
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
   std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not

@@ -90,9 +90,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
   } catch (const PassedOver& other) {
-    ++passed_over_[body].messages;
-    passed_over_[body].newest = shortText(other.what());
-    return;
+    return passed_over_[body].add(shortText(other.what()));
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {

@@ -189,8 +189,8 @@ class MonitorPipeline {
   bool trusted_placed_ = false;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
   std::string map_note_;                                 // to be told
-  std::set<std::string> map_notes_;  // LoadedMap::note, as far as they were told; there are a few for each source
-  std::string map_slow_;             // LoadedMap::slow of the newest one
+  std::set<std::string> map_notes_;   // LoadedMap::note, as far as they were told; there are a few for each source
+  std::string map_slow_;              // LoadedMap::slow of the newest one
   std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
   std::string map_doubt_;
   struct ClockFrame {
@@ -208,6 +208,10 @@ class MonitorPipeline {
   struct OtherMarkers {
     std::uint64_t messages = 0;
     std::string newest;
+    void add(std::string why) {
+      ++messages;
+      newest = std::move(why);
+    }
   };
   std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;

@@ -107,6 +107,14 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
   }
 }
 
+static void setLens(const FittedCamera& camera, PictureGeometry& geometry) {
+  geometry.fx = camera.lens.fx;
+  geometry.fy = camera.lens.fy;
+  geometry.cx = camera.lens.cx;
+  geometry.cy = camera.lens.cy;
+  geometry.off_px = camera.off_px;
+}
+
 SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, std::size_t most_bytes) {
   ends.clear();
   passed.clear(most_bytes);
@@ -160,11 +168,7 @@ SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, st
     return counts;
   }
   geometry.camera_from_map = camera->camera_from_sensor * view.map_from_sensor.linear().transpose();
-  geometry.fx = camera->lens.fx;
-  geometry.fy = camera->lens.fy;
-  geometry.cx = camera->lens.cx;
-  geometry.cy = camera->lens.cy;
-  geometry.off_px = camera->off_px;
+  setLens(*camera, geometry);
   geometry.range = limits.clear_m * limits.voxels_per_m;
   geometry.resolution_m = limits.resolution_m;
   geometry.xyz = view.xyz;
