@@ -29,6 +29,9 @@ constexpr double HALF_ULP = 0x1p-53;  ///< [1] the largest relative error of one
 constexpr double CONTACT_M = 1e-6;
 /// [m] Straight paths of a step's parts stay this close to a rigid body's arc. Smaller: more parts, each a whole step.
 constexpr double RIGID_PATH_M = 1e-3;
+/// [m, rad] What tf says of one stamp twice is the same place: publishers compute it anew, or send it as float. Larger: a
+/// frame that is elsewhere is not seen. Smaller: what no step can feel ends its proof.
+constexpr double SAME_PLACE = 1e-6;
 /// [s] A longer pause between two frames is a gap: what moved in it is not known to be straight.
 constexpr double LONGEST_STEP_S = 0.5;
 /// [m] A vertex that moves further in a step is a teleport, no motion: trackers lose a mesh and find it elsewhere.
@@ -96,6 +99,7 @@ constexpr double CLEARANCE_BOX = 16 * HALF_ULP;   ///< [1] slack of the squared 
 constexpr double CLEARANCE_RELATIVE = 1e-9;       ///< [1] of a distance: how far its bounds may be apart in any case
 constexpr double CLEARANCE_UNDERFLOW_M = 1e-290;  ///< [m] more than underflow takes from a distance
 constexpr double CLEARANCE_LARGEST_M = 1e150;     ///< [m] guard: squares stay finite
+constexpr double CLEARANCE_DIRECTION_M = 1e-140;  ///< [m] guard: squares of less lose digits, and tell no direction
 constexpr double CLEARANCE_SHORTEST = 0x1p-48;    ///< [1] part of a step that is not halved any more
 /// [1] Of clearance.self_m, up to where a body's distance from itself is looked for. Larger: a sheet that is not folded
 /// may be found near itself, and searches take longer. Smaller: only narrower folds are seen.

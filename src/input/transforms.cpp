@@ -19,8 +19,6 @@ namespace dccd {
 
 namespace {
 
-// [m] and [rad]: what two broadcasters of one transform round apart, also by way of single precision.
-constexpr double SAME = 1e-6;
 // tf2 follows no longer chain.
 constexpr std::size_t MAX_CHAIN = 1000;
 constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
@@ -238,7 +236,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       continue;
     }
     if (is_static) {
-      if (frame->fixed.parent && !isSame(frame->fixed, sent, SAME)) ++times_forgotten_;
+      if (frame->fixed.parent && !isSame(frame->fixed, sent, tolerance::SAME_PLACE)) ++times_forgotten_;
       frame->fixed = sent;
     } else {
       const Jump jump = jumpOf(transform, *sent.sender);
@@ -249,7 +247,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       if (jump == Jump::LOOP) forgetAllOf(*sent.sender);
       if (isRepeated(transform, sent, *frame)) {
         const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
-        if (!isSame(frame->sent.at(stamp_ns), sent, SAME)) passOver(transform);
+        if (!isSame(frame->sent.at(stamp_ns), sent, tolerance::SAME_PLACE)) passOver(transform);
         continue;
       }
       if (frame->is_apart) continue;

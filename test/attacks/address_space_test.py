@@ -73,6 +73,7 @@ class AddressSpaceTest(AttackTest):
     def test_a_checkerboard(self):
         name = 'space_board'
         self.start(name, **{'effects/octomap': 'on', 'octomap_topic': '/%s/map' % name})
+        resource.prlimit(self.node.pid, resource.RLIMIT_AS, (7 * SPACE // 8, SPACE))  # in all of it the map has room
         maps = self.advertise('/%s/map' % name, Octomap)
         whole = Octomap(binary=True, id='OcTree', resolution=0.01)
         whole.header.frame_id = 'world'

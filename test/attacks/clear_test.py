@@ -101,7 +101,7 @@ class ClearTest(AttackTest):
         return self.step_of(at(seconds), z)
 
     def assert_unknown(self, outcome, state, body, why):
-        self.assertTrue(outcome.answered)
+        self.assertTrue(outcome.answered, outcome.reason)
         self.assertFalse(state.clear)
         self.assertIn("where body '%s' was is not known for all of this step" % body, state.reason)
         self.assertIn(why, state.reason)
@@ -146,7 +146,7 @@ class ClearTest(AttackTest):
             t += 0.16
 
     def test_frames_of_another_body_that_cannot_be_used(self):
-        self.start_with_finger('bad')
+        self.start_with_finger('bad', transform_timeout_s=0.02)  # less than steps wait for another body
         self.step_of_all(0)
         t = 0.04
         for what in ('cut', 'lost vertices', 'without a transform', 'the same stamp, elsewhere'):
@@ -163,7 +163,8 @@ class ClearTest(AttackTest):
                 bad = sheet(at(t), 1.4)
             self.to['other'].publish(bad)
             outcome, state = self.step_of_all(t + 0.04)
-            self.assert_unknown(outcome, state, 'other', 'lost vertices' if what == 'lost vertices' else 'not used: ')
+            with self.subTest(what=what):
+                self.assert_unknown(outcome, state, 'other', 'lost vertices' if what == 'lost vertices' else 'not used: ')
             self.assert_recovers(t + 0.08)
             t += 0.16
 

@@ -109,7 +109,6 @@ class NearestSearch {
     }
   };
 
-  static constexpr double SHORTEST_M = 1e-140;     // squares of less lose digits
   static constexpr std::uint32_t MOST_KNOWN = 64;  // features of a node whose reach is that of its vertices
   /// Of a node, along the direction of that number.
   struct Reach {
@@ -212,7 +211,7 @@ class NearestSearch {
     if (!(enough_m_ > 0)) return false;
     const Vec3 between = box_a.middle(goal_.at_end) - box_b.middle(goal_.at_end);
     const double length = between.norm();
-    if (!(length > SHORTEST_M)) return false;
+    if (!(length > tolerance::CLEARANCE_DIRECTION_M)) return false;
     const Vec3 direction = between / length;
     const auto reachOf = [&](const auto& tree, std::uint32_t in, const Vec3& along) {
       return pair.items ? tree.itemReach(in, along, goal_.at_end) : tree.leafReach(in, along, goal_.at_end);

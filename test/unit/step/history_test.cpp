@@ -215,7 +215,7 @@ TEST(History, EverySeamOfAStreamLeavesNothingBehind) {
          Outcome refused;
          EXPECT_TRUE(s.monitor.next(0, refused));
        },
-       StepStatus::OK, Clears::NEVER},
+       StepStatus::PARTIAL, Clears::NEVER},
   };
   const Step scene = clothsInABox().motion();
   for (const Seam& seam : seams) {

@@ -53,7 +53,7 @@ TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
   EXPECT_FALSE(assuranceOf(outcome).clear());
   EXPECT_EQ(outcome.arrival_ns, 77);
   ASSERT_TRUE(monitor.next(NOW, outcome));
-  EXPECT_EQ(outcome.status, StepStatus::OK) << "from the frame before the refused one";
+  EXPECT_EQ(outcome.status, StepStatus::PARTIAL) << "from the frame before the refused one, which is missed";
   EXPECT_EQ(outcome.start_ns, 0);
   EXPECT_EQ(outcome.arrival_ns, 88);
   expectAddsUp(monitor);
