@@ -107,6 +107,11 @@ class AuditTest(AnalyzeBagTestCase):
         self.assertEqual((status, verdict['refuted']), (3, []), said)
         self.assertIn('own_voxels_m', verdict['not_covered'][0]['reason'])
 
+    def test_what_cannot_be_read_is_no_verdict(self):
+        status, _, said = self.audit(self.folder / 'none.bag')
+        self.assertEqual(status, 2, said)
+        self.assertRegex(said, r'^audit_bag: .*none\.bag')
+
     def test_it_shares_nothing_and_is_read_in_an_hour(self):
         allowed = {'argparse', 'bisect', 'dataclasses', 'fractions', 'json', 'os', 'random', 're', 'struct', 'subprocess', 'sys',
                    'tempfile', 'time', 'numpy', 'rosbag', 'yaml', 'came', 'placed', 'touches'}
