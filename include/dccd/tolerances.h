@@ -29,8 +29,8 @@ constexpr double HALF_ULP = 0x1p-53;  ///< [1] the largest relative error of one
 constexpr double CONTACT_M = 1e-6;
 /// [m] Straight paths of a step's parts stay this close to a rigid body's arc. Smaller: more parts, each a whole step.
 constexpr double RIGID_PATH_M = 1e-3;
-/// [m, rad] What tf says of one stamp twice is the same place: publishers compute it anew, or send it as float. Larger: a
-/// frame that is elsewhere is not seen. Smaller: what no step can feel ends its proof.
+/// [m, rad] What tf says of one stamp twice is the same place: publishers compute it anew, or send it as float. Larger:
+/// a frame that is elsewhere is not seen. Smaller: what no step can feel ends its proof.
 constexpr double SAME_PLACE = 1e-6;
 /// [s] A longer pause between two frames is a gap: what moved in it is not known to be straight.
 constexpr double LONGEST_STEP_S = 0.5;
