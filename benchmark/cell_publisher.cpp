@@ -507,8 +507,10 @@ class Witness {
     if (!is_open_ || !m.answered) return;
     latencies_ms_.push_back(1e3 * m.latency);
     steps_ms_.push_back(m.total_ms);
-    clearances_ms_.push_back(m.clearance_ms);
-    if (m.own_voxels_ms > 0) own_voxels_ms_.push_back(m.own_voxels_ms);
+    for (const auto& stage : m.stages) {
+      if (stage.name == "clearance") clearances_ms_.push_back(stage.ms);
+      if (stage.name == "own_voxels" && stage.ms > 0) own_voxels_ms_.push_back(stage.ms);
+    }
     last_ = {{"frames_received", m.frames_received}, {"frames_processed", m.frames_processed},
              {"frames_skipped", m.frames_skipped},   {"maps_received", m.maps_received},
              {"maps_refused", m.maps_refused},       {"map_leaves", m.map_leaves}};
