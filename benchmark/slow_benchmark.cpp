@@ -26,7 +26,7 @@ using test::ArmManner;
 using test::ClosedLoop;
 using Law = std::function<double(const Outcome&)>;
 
-constexpr double UNCERTAINTY_M = 0.02;  // Z of speed_scale: what gusts and the swinging cloth may take
+constexpr double UNCERTAINTY_M = 0.025;  // Z of speed_scale: what gusts and the swinging cloth may take
 
 struct Candidate {
   std::string law, numbers;

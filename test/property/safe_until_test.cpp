@@ -216,7 +216,7 @@ TEST(AdversaryProperty, NoMotionWithinTheBoundsTouchesBeforeTheCertificate) {
   RecordProperty("at least half of the true time", static_cast<int>(half));
 }
 
-constexpr SpeedLaw LAW{ClosedLoop::REACTION_S, ClosedLoop::FULL_SPEED_M_S / (0.8 * ClosedLoop::BRAKING_M_S2), 0.02};
+constexpr SpeedLaw LAW{ClosedLoop::REACTION_S, ClosedLoop::FULL_SPEED_M_S / (0.8 * ClosedLoop::BRAKING_M_S2), 0.025};
 
 TEST(ClosedLoopProperty, AnArmThatSlowsDownTouchesNothingAndIsFasterThanAThreshold) {
   const std::uint64_t seeds = longRun() ? 1000 : 10;
