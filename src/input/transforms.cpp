@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <sstream>
 #include <utility>
 
 #include <geometry_msgs/TransformStamped.h>
 #include <ros/serialization.h>
-#include <tf2/exceptions.h>
 #include <Eigen/Geometry>
 #include <boost/make_shared.hpp>
 
@@ -19,15 +17,7 @@ namespace dccd {
 
 namespace {
 
-// tf2 follows no longer chain.
-constexpr std::size_t MAX_CHAIN = 1000;
 constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
-
-ros::Time toTime(StampNs stamp_ns) {
-  ros::Time time;
-  time.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
-  return time;
-}
 
 /// As tf2 takes a name.
 std::string unslashed(const std::string& name) { return !name.empty() && name[0] == '/' ? name.substr(1) : name; }
@@ -282,30 +272,10 @@ void TransformFeed::passOver(const geometry_msgs::TransformStamped& transform) {
   (next == frame.sent.end() ? frame.passed_over : next->second.gap) = true;
 }
 
-/// On the way that was found last, or as far as it goes; null: none.
-const TransformFeed::Frame* TransformFeed::firstApart() const {
-  for (const Chain* chain : {&from_target_, &from_source_}) {
-    const auto found = std::find_if(chain->begin(), chain->end(), [](const Frame* frame) { return frame->is_apart; });
-    if (found != chain->end()) return *found;
-  }
-  return nullptr;
-}
-
 /// For good, as for tf2 a frame stays what it was first.
 void TransformFeed::dispute(const geometry_msgs::TransformStamped& transform, Frame& frame) {
   frame.is_disputed = has_disputed_ = true;
   leaveOut(transform, "it is on /tf and, elsewhere, on /tf_static; stop one of the two and start the monitor anew");
-}
-
-/// On the way that was found last; null: none.
-const TransformFeed::Frame* TransformFeed::disputedOnWay() const {
-  if (!has_disputed_) return nullptr;
-  for (const Chain* chain : {&from_target_, &from_source_}) {
-    const auto end = std::prev(chain->end());
-    const auto found = std::find_if(chain->begin(), end, [](const Frame* frame) { return frame->is_disputed; });
-    if (found != end) return *found;
-  }
-  return nullptr;
 }
 
 /// Its rotation has the length 1.
@@ -313,218 +283,6 @@ TransformFeed::Pose TransformFeed::poseOf(const geometry_msgs::Transform& transf
   const auto& q = transform.rotation;
   const auto& p = transform.translation;
   return {Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized(), Vec3(p.x, p.y, p.z)};
-}
-
-/// Where the frame's parent has it: a transform of this very stamp as it was sent, else what tf2 says.
-const TransformFeed::Sent& TransformFeed::sentAt(const Frame& frame, StampNs stamp_ns) const {
-  if (!frame.is_static || *frame.is_static) return frame.fixed;
-  if (frame.asked_change == change_ && frame.asked_ns == stamp_ns) return frame.asked;
-  frame.asked = Sent();
-  const bool is_newest = !frame.sent.empty() && frame.sent.rbegin()->first == stamp_ns;  // most of the time
-  const auto at = is_newest ? std::prev(frame.sent.end()) : frame.sent.find(stamp_ns);
-  std::string parent;
-  if (at != frame.sent.end()) {
-    frame.asked = at->second;
-  } else if (frame.is_apart) {
-    frame.asked = between(frame, stamp_ns);
-  } else if (buffer_._getParent(frame.name, toTime(stamp_ns), parent)) {
-    frame.asked = {frameOf(parent), poseOf(buffer_.lookupTransform(parent, frame.name, toTime(stamp_ns)).transform)};
-  }
-  frame.asked_change = change_;
-  frame.asked_ns = stamp_ns;
-  return frame.asked;
-}
-
-/// As tf2 has it between two stamps; nowhere between those of two publishers, whose clocks may be apart.
-TransformFeed::Sent TransformFeed::between(const Frame& frame, StampNs stamp_ns) {
-  const auto next = frame.sent.upper_bound(stamp_ns);
-  if (next == frame.sent.begin() || next == frame.sent.end()) return {};
-  const Sent &one = std::prev(next)->second, &other = next->second;
-  if (one.sender != other.sender) return {};
-  if (one.parent != other.parent) return one;
-  const StampNs from_ns = std::prev(next)->first;
-  const double share = static_cast<double>(stamp_ns - from_ns) / static_cast<double>(next->first - from_ns);
-  return {one.parent,
-          {one.pose.rotation.slerp(share, other.pose.rotation).normalized(),
-           (1 - share) * one.pose.translation + share * other.pose.translation},
-          one.sender};
-}
-
-const TransformFeed::Frame* TransformFeed::newestParentOf(const Frame& frame) {
-  return frame.sent.empty() ? frame.fixed.parent : frame.sent.rbegin()->second.parent;
-}
-
-/// The first of one that moves after the stamp. Most of the time that is none, or one of the newest.
-std::map<StampNs, TransformFeed::Sent>::const_iterator TransformFeed::after(const Frame& frame, StampNs stamp_ns) {
-  auto found = frame.sent.end();
-  for (int newest = 0; newest < 4 && found != frame.sent.begin(); ++newest) {
-    if (std::prev(found)->first <= stamp_ns) return found;
-    --found;
-  }
-  return frame.sent.upper_bound(stamp_ns);
-}
-
-/// As tf2 takes it between two stamps with other parents: the one before. Of what it does not know, the nearest.
-const TransformFeed::Frame* TransformFeed::parentAt(const Frame& frame, StampNs stamp_ns) {
-  if (frame.sent.empty()) return frame.fixed.parent;
-  const auto next = after(frame, stamp_ns);
-  return (next == frame.sent.begin() ? next : std::prev(next))->second.parent;
-}
-
-/// Both chains, up to where the two meet. False: they do not.
-template <class ParentOf>
-bool TransformFeed::findWay(const std::string& target, const std::string& source, ParentOf parentOf) const {
-  const auto climb = [&](const std::string& name, Chain& chain) {
-    chain.clear();
-    for (const Frame* at = frameOf(name); at && chain.size() <= MAX_CHAIN; at = parentOf(*at)) chain.push_back(at);
-  };
-  climb(target, from_target_);
-  climb(source, from_source_);
-  const auto meeting =
-      std::find_first_of(from_source_.begin(), from_source_.end(), from_target_.begin(), from_target_.end());
-  if (meeting == from_source_.end()) return false;
-  from_target_.erase(std::find(from_target_.begin(), from_target_.end(), *meeting) + 1, from_target_.end());
-  from_source_.erase(meeting + 1, from_source_.end());
-  return true;
-}
-
-/// By what sentAt() found last.
-TransformFeed::Pose TransformFeed::poseAlong(const Chain& chain) {
-  Pose sum;
-  for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
-    const Frame& frame = *chain[i];
-    const Pose& one = *frame.is_static ? frame.fixed.pose : frame.asked.pose;
-    sum.translation = one.translation + one.rotation * sum.translation;
-    sum.rotation = one.rotation * sum.rotation;
-  }
-  return sum;
-}
-
-bool TransformFeed::lookup(const std::string& target, const std::string& source, StampNs stamp_ns,
-                           Eigen::Isometry3d& transform, std::string& reason) const {
-  transform = Eigen::Isometry3d::Identity();
-  if (target == source) return true;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  try {
-    const auto isDisputed = [&] {
-      const Frame* const frame = disputedOnWay();
-      if (frame) reason = "'" + shortText(frame->name, MAX_NAME) + "' is on /tf and, elsewhere, on /tf_static";
-      return frame != nullptr;
-    };
-    if (has_disputed_ && findWay(target, source, newestParentOf) && isDisputed()) return false;
-    // What tf2 knows of such a frame is out of date.
-    const bool is_way = has_apart_ && findWay(target, source, newestParentOf);
-    const Frame* const apart = has_apart_ ? firstApart() : nullptr;
-    if (apart && is_way && stamp_ns <= 0) {
-      StampNs newest_ns = std::numeric_limits<StampNs>::max();
-      forEachKeptOnWay([&](const Frame& frame) { newest_ns = std::min(newest_ns, frame.sent.rbegin()->first); });
-      stamp_ns = newest_ns;
-    }
-    Pose of_target, of_source;
-    // The newest common transform is tf2's to find, and so is the reason why there is none.
-    if (stamp_ns > 0 && findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
-      if (isDisputed()) return false;
-      of_target = poseAlong(from_target_);
-      of_source = poseAlong(from_source_);
-    } else if (apart) {
-      reason = "nothing is known of '" + shortText(apart->name, MAX_NAME) +
-               "' then; what was sent before is forgotten, as the stamps of ";
-      for (const auto& [sender, newest_ns] : apart->newest) {
-        reason += (sender == apart->newest.begin()->first ? "'" : "' and '") + shortText(sender, MAX_NAME);
-      }
-      reason += apart->newest.size() > 1 ? "', which both send it, are apart" : "' went back";
-      return false;
-    } else {
-      for (const std::string* name : {&target, &source}) {
-        reason = frameNameProblem(*name);
-        if (reason.empty()) continue;
-        reason = "'" + shortText(*name, MAX_NAME) + "' is no frame's name: " + reason;
-        return false;
-      }
-      if (!buffer_.canTransform(target, source, toTime(stamp_ns), &reason)) return false;
-      of_source = poseOf(buffer_.lookupTransform(target, source, toTime(stamp_ns)).transform);
-    }
-    const Eigen::Quaterniond back = of_target.rotation.conjugate();
-    transform.linear() = (back * of_source.rotation).normalized().toRotationMatrix();
-    transform.translation() = back * (of_source.translation - of_target.translation);
-    return transform.matrix().allFinite();
-  } catch (const tf2::TransformException& error) {
-    reason = error.what();
-    return false;
-  }
-}
-
-/// With each frame that moves on the way that was found last.
-template <class Take>
-void TransformFeed::forEachKeptOnWay(Take take) const {
-  for (const Chain* chain : {&from_target_, &from_source_}) {
-    for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
-      if (!(*chain)[i]->sent.empty()) take(*(*chain)[i]);
-    }
-  }
-}
-
-std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
-                                                  StampNs to_ns, std::vector<NewParent>& changes) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<StampNs> stamps;
-  // The way at the end, then the one that was there before its last change, and so on.
-  for (StampNs end_ns = to_ns; end_ns > from_ns;) {
-    if (!findWay(target, source, [&](const Frame& frame) { return parentAt(frame, end_ns); })) break;
-    const std::tuple question(change_, from_ns, end_ns);
-    NewParent last{from_ns, nullptr, nullptr, nullptr};
-    forEachKeptOnWay([&](const Frame& frame) {
-      if (frame.none_between == question) return;
-      const std::size_t found_before = stamps.size();
-      const Frame *const parent = parentAt(frame, end_ns), *before = nullptr;
-      StampNs since_ns = from_ns;
-      auto one = after(frame, end_ns);
-      bool has_gap =
-          one != frame.sent.end() && one != frame.sent.begin() && one->second.gap && std::prev(one)->first < end_ns;
-      while (one != frame.sent.begin()) {
-        --one;
-        has_gap = has_gap || (one->second.gap && one->first > from_ns && one != frame.sent.begin());
-        before = one->second.parent;
-        if (before != parent) break;
-        since_ns = one->first;
-        if (since_ns <= from_ns) break;
-        if (since_ns < to_ns) stamps.push_back(since_ns);
-      }
-      if (has_gap) changes.push_back({end_ns, &frame.name, nullptr, nullptr});
-      const bool has_all = since_ns <= from_ns || (before == parent && !frame.is_cut);
-      if (has_all && !has_gap && stamps.size() == found_before) frame.none_between = question;
-      if (has_all || since_ns <= last.stamp_ns) return;
-      last = {since_ns, &frame.name, before == parent ? nullptr : &before->name, &parent->name};
-    });
-    if (!last.frame) break;
-    changes.push_back(last);
-    end_ns = last.stamp_ns - 1;
-  }
-  std::sort(stamps.begin(), stamps.end());
-  stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
-  return stamps;
-}
-
-std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, const std::string& source) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  std::optional<StampNs> first;
-  if (!findWay(target, source, newestParentOf)) return first;
-  forEachKeptOnWay([&](const Frame& frame) {
-    first = std::max(first.value_or(frame.sent.begin()->first), frame.sent.begin()->first);
-  });
-  return first;
-}
-
-void transform(const Eigen::Isometry3d& target_from_source, Positions& positions) {
-  if (target_from_source.matrix() == Eigen::Matrix4d::Identity()) return;  // keeps the bits
-  for (Vec3& p : positions) p = target_from_source * p;
-}
-
-Positions transformed(const Eigen::Isometry3d& target_from_source, const Positions& positions) {
-  if (target_from_source.matrix() == Eigen::Matrix4d::Identity()) return positions;
-  Positions out(positions.size());
-  for (std::size_t v = 0; v < out.size(); ++v) out[v] = target_from_source * positions[v];
-  return out;
 }
 
 }  // namespace dccd
