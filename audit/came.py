@@ -160,10 +160,12 @@ class Reader:
         bare[surface.used] = False
         return Frame(stamp, name, positions, surface, unchecked + int((lost | bare).sum()), came, number)
 
+    def topology(self):
+        said = self.settings.get('topology', {})
+        return {'source': said} if isinstance(said, str) else said
+
     def given(self, positions):
-        topology = self.settings.get('topology', {})
-        if isinstance(topology, str):
-            topology = {'source': topology}
+        topology = self.topology()
         if topology.get('source') == 'depth_image':
             raise NotCovered('a depth image as a body')
         if 'file' in topology:
@@ -171,11 +173,10 @@ class Reader:
             return mesh[1]
         if topology.get('rows') and topology.get('cols'):
             return self.reuse(('grid', topology['rows'], topology['cols']), lambda: grid(topology['rows'], topology['cols']))
-        if topology.get('source') == 'polyline' and self.lines is None:
+        if topology.get('source') == 'polyline':
             return self.reuse(('rope', len(positions)), lambda: Surface(len(positions), lines=rope(len(positions))))
         return None
 
-    lines = None
     made = (None, None)
 
     def reuse(self, key, make):
@@ -187,6 +188,8 @@ class Reader:
         points = cloud_points(m)
         if not len(points):
             raise Refused('no points')
+        if self.topology().get('source') == 'polyline' and m.height > 1 and m.width > 1:
+            raise NotCovered('ropes in the rows of a cloud')
         surface = self.reuse(('grid', m.height, m.width), lambda: grid(m.height, m.width)) \
             if m.height > 1 and m.width > 1 else None
         return points, surface, 0
@@ -388,6 +391,7 @@ class Map:
     frame: str = ''
     came: int = 0
     number: int = 0
+    problem: str = ''  # why it cannot be read
 
     def boxes(self):
         keys = self.corners.astype(float) - 32768

@@ -190,13 +190,9 @@ class Held {
     const std::vector<std::int8_t> bytes = map_.serialized(false);
     const std::string expected = by_voxels_.bytes();
     ASSERT_TRUE(std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end())) << "another tree";
-    OctomapFields fields;
-    fields.id = "OcTree";
-    fields.resolution = options_.resolution_m;
-    fields.binary = false;
-    fields.data = expected.data();
-    fields.size = expected.size();
-    const DecodedOctomap decoded = decodeOctomap(fields), leaves = map_.leaves();
+    const DecodedOctomap leaves = map_.leaves();
+    const DecodedOctomap decoded =
+        decodeOctomap({"OcTree", options_.resolution_m, false, expected.data(), expected.size()});
     EXPECT_TRUE(areSame(decoded.occupied, leaves.occupied));
     EXPECT_TRUE(areSame(decoded.free, leaves.free));
     EXPECT_TRUE(expanded(map_.doubtful()) == by_voxels_.doubtful());

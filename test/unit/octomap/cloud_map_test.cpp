@@ -251,13 +251,8 @@ TEST(CloudMap, NeedsNoMoreThanItMay) {
     EXPECT_LE(map.memoryBytes(), limit);
     // What is in it is listed.
     const std::vector<std::int8_t> bytes = map.serialized(false);
-    OctomapFields fields;
-    fields.id = "OcTree";
-    fields.resolution = options.resolution_m;
-    fields.binary = false;
-    fields.data = bytes.data();
-    fields.size = bytes.size();
-    const DecodedOctomap decoded = decodeOctomap(fields), leaves = map.leaves();
+    const DecodedOctomap leaves = map.leaves();
+    const DecodedOctomap decoded = decodeOctomap({"OcTree", options.resolution_m, false, bytes.data(), bytes.size()});
     EXPECT_EQ(decoded.occupied.size(), leaves.occupied.size());
     EXPECT_EQ(decoded.free.size(), leaves.free.size());
     EXPECT_EQ(leaves.free.empty(), !is_picture) << "before the octree is changed, or in the middle";
