@@ -79,10 +79,8 @@ TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped&
     const bool went_back = its_newest != frame->newest.end() && stamp_ns < its_newest->second - JUMP_BACK_NS;
     return went_back ? Jump::LOOP : Jump::TWO_SENDERS;
   }
-  const Pose &before = at_stamp->second.pose, now = poseOf(transform.transform);
-  const bool is_there = at_stamp->second.parent == frameOf(unslashed(transform.header.frame_id)) &&
-                        before.translation == now.translation && before.rotation.coeffs() == now.rotation.coeffs();
-  if (is_there) return Jump::NONE;
+  const Sent now{frameOf(unslashed(transform.header.frame_id)), poseOf(transform.transform)};
+  if (isSame(at_stamp->second, now, tolerance::SAME_PLACE)) return Jump::NONE;
   return *at_stamp->second.sender == sender ? Jump::LOOP : Jump::TWO_SENDERS;
 }
 
