@@ -83,6 +83,7 @@ TEST_F(TransformFeedTest, AFrameThatWasElsewhereAtAStampBeginsAnew) {
   EXPECT_FALSE(feed.add(turned("finger", 1, 1.25, 3), false)) << "the same once more, as a loop sends it";
   EXPECT_FALSE(feed.add(turned("finger", 1, 1.125, 7), false)) << "late, and nothing contradicts it";
   EXPECT_FALSE(feed.add(turned("finger", 1, 1.5, 4), false)) << "the newest stays what came first, as tf2 has it";
+  EXPECT_FALSE(feed.add(turned("finger", 1, 1.25, 3 + 5e-7), false)) << "as two broadcasters round";
   const tf2_msgs::TFMessage elsewhere = turned("finger", 1, 1.25, 5);
   EXPECT_TRUE(feed.clears(elsewhere, false));
   EXPECT_TRUE(feed.add(elsewhere, false));
