@@ -66,6 +66,7 @@ class OctreeUpdate {
   TreeLeaves run() {
     path_[0].node = tree_.getRoot();
     visit(0);
+    for (Range* list : {&occupied_, &free_, &doubtful_}) list->keepAll();
     return std::move(after_);
   }
   bool isFull() const { return full_; }
@@ -74,28 +75,39 @@ class OctreeUpdate {
   using Node = octomap::OcTreeNode;
   static constexpr int VOXEL_DEPTH = 16;
 
-  /// A list before and after, up to the cube that is visited.
+  /// A list before and after. What is not skipped is kept, and written down once something behind it changes: of most
+  /// cubes nothing does.
   class Range {
    public:
     Range(const std::vector<OccupiedLeaf>& from, std::vector<OccupiedLeaf>& to) : from_(from), to_(to) {
       to_.reserve(from.size() + from.size() / 16);
     }
-    bool isIn(const OctreeCube& cube) const {
-      return next_ < static_cast<std::ptrdiff_t>(from_.size()) && cube.holds(from_[next_]);
+    bool isIn(const OctreeCube& cube) {
+      keepBefore(cube.code);
+      return next_ < from_.size() && cube.holds(from_[next_]);
     }
-    void skip(const OctreeCube& cube) { next_ = endIn(cube); }
-    void keep(const OctreeCube& cube) {
-      const std::size_t end = endIn(cube);
-      to_.insert(to_.end(), from_.begin() + next_, from_.begin() + end);
-      next_ = end;
+    void skip(const OctreeCube& cube) {
+      keepBefore(cube.code);
+      while (next_ < from_.size() && cube.holds(from_[next_])) ++next_;
     }
+    /// Behind all that was listed so far.
+    void list(const OctreeCube& cube) {
+      keepBefore(cube.code);
+      to_.push_back(cube.leaf());
+    }
+    /// What is in the cube, listed or kept, is there no more.
+    void remove(const OctreeCube& cube) {
+      skip(cube);
+      while (!to_.empty() && cube.holds(to_.back())) to_.pop_back();
+    }
+    void keepAll() { keepBefore(~std::uint64_t{0}); }
 
    private:
     const std::vector<OccupiedLeaf>& from_;
     std::vector<OccupiedLeaf>& to_;
-    std::ptrdiff_t next_ = 0;
+    std::size_t next_ = 0;
 
-    std::ptrdiff_t endIn(const OctreeCube& cube) const;
+    void keepBefore(std::uint64_t code);
   };
 
   /// A cube on the way from the root to the one that is visited.
@@ -135,7 +147,6 @@ class OctreeUpdate {
 
   void divide(int depth) {
     Step& at = path_[depth];
-    const std::size_t occupied = after_.occupied.size(), free = after_.free.size();
     for (unsigned i = 0; i < 8; ++i) {
       Step& part = path_[depth + 1];
       part = Step();
@@ -147,29 +158,23 @@ class OctreeUpdate {
       visit(depth + 1);
       at.changed = at.changed || part.changed;
     }
-    if (!at.changed) {
-      if (at.node && leafOf(at)) keepLeaves(at);
-    } else {
-      fold(at.node, at.cube, occupied, free);
+    if (at.changed) {
+      fold(at.node, at.cube);
+    } else if (at.node && leafOf(at)) {
+      keep(at);
     }
   }
 
+  /// A leaf above that is not divided stands for it, or is kept; the parts of one that is are listed then.
   void keep(const Step& at) {
-    doubtful_.keep(at.cube);
-    keepLeaves(at);
-  }
-  void keepLeaves(const Step& at) {
-    if (!at.node && at.cover) return;  // that leaf is kept, or its parts are listed when it is divided
-    if (at.was_covered) return list(at.cube, at.node);
-    occupied_.keep(at.cube);
-    free_.keep(at.cube);
+    if (at.node && at.was_covered) list(at.cube, at.node);
   }
 
   /// All of the cube, in which no point lies.
   void miss(int depth) {
     Step& at = path_[depth];
     doubtful_.skip(at.cube);
-    if (isLeast(leafOf(at))) return keepLeaves(at);
+    if (isLeast(leafOf(at))) return keep(at);
     take(depth);
     missTree(at.node, at.cube);
   }
@@ -178,12 +183,11 @@ class OctreeUpdate {
       tree_.updateNodeLogOdds(node, tree_.getProbMissLog());
       return list(cube, node);
     }
-    const std::size_t occupied = after_.occupied.size(), free = after_.free.size();
     for (unsigned i = 0; i < 8; ++i) {
       const bool exists = tree_.nodeChildExists(node, i);
       if (exists || !full_) missTree(exists ? tree_.getNodeChild(node, i) : make(node, i), cube.child(i));
     }
-    fold(node, cube, occupied, free);
+    fold(node, cube);
   }
 
   /// The voxel in which points lie.
@@ -194,11 +198,11 @@ class OctreeUpdate {
     if (!fills || full_) return keep(at);
     doubtful_.skip(at.cube);
     const Node* leaf = leafOf(at);
-    if (leaf && leaf->getLogOdds() >= most_) return keepLeaves(at);
+    if (leaf && leaf->getLogOdds() >= most_) return keep(at);
     take(VOXEL_DEPTH);
     tree_.updateNodeLogOdds(at.node, tree_.getProbHitLog());
     list(at.cube, at.node);
-    if (!tree_.isNodeOccupied(at.node)) after_.doubtful.push_back(at.cube.leaf());
+    if (!tree_.isNodeOccupied(at.node)) doubtful_.list(at.cube);
   }
 
   /// The cube's node is there from then on, and what is below it will be listed anew.
@@ -237,13 +241,13 @@ class OctreeUpdate {
   }
 
   void list(const OctreeCube& cube, const Node* leaf) {
-    (tree_.isNodeOccupied(leaf) ? after_.occupied : after_.free).push_back(cube.leaf());
+    (tree_.isNodeOccupied(leaf) ? occupied_ : free_).list(cube);
   }
-  /// Once the parts of a cube have changed: as OcTree::updateNode() does. The counts: of the leaves listed before it.
-  void fold(Node* node, const OctreeCube& cube, std::size_t occupied, std::size_t free) {
+  /// Once the parts of a cube have changed: as OcTree::updateNode() does.
+  void fold(Node* node, const OctreeCube& cube) {
     if (!tree_.pruneNode(node)) return node->updateOccupancyChildren();
-    after_.occupied.resize(occupied);
-    after_.free.resize(free);
+    occupied_.remove(cube);
+    free_.remove(cube);
     list(cube, node);
   }
 
@@ -256,17 +260,18 @@ class OctreeUpdate {
 };
 
 template <class Look>
-std::ptrdiff_t OctreeUpdate<Look>::Range::endIn(const OctreeCube& cube) const {
-  const auto size = static_cast<std::ptrdiff_t>(from_.size());
-  // Most ranges are short.
-  std::ptrdiff_t end = next_, step = 1;
-  while (end < size && cube.holds(from_[end])) {
-    end = std::min(size, end + step);
+void OctreeUpdate<Look>::Range::keepBefore(std::uint64_t code) {
+  const auto isBefore = [&](const OccupiedLeaf& leaf) { return codeOf(leaf) < code; };
+  // Most times there are few.
+  std::size_t end = next_, step = 1;
+  while (end < from_.size() && isBefore(from_[end])) {
+    end = std::min(from_.size(), end + step);
     step *= 2;
   }
-  return std::partition_point(from_.begin() + next_, from_.begin() + end,
-                              [&](const OccupiedLeaf& leaf) { return cube.holds(leaf); }) -
-         from_.begin();
+  const auto first = from_.begin() + static_cast<std::ptrdiff_t>(next_);
+  const auto last = std::partition_point(first, from_.begin() + static_cast<std::ptrdiff_t>(end), isBefore);
+  to_.insert(to_.end(), first, last);
+  next_ = static_cast<std::size_t>(last - from_.begin());
 }
 
 }  // namespace dccd
