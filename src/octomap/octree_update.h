@@ -240,9 +240,7 @@ class OctreeUpdate {
     return tree_.createNodeChild(above, index);
   }
 
-  void list(const OctreeCube& cube, const Node* leaf) {
-    (tree_.isNodeOccupied(leaf) ? occupied_ : free_).list(cube);
-  }
+  void list(const OctreeCube& cube, const Node* leaf) { (tree_.isNodeOccupied(leaf) ? occupied_ : free_).list(cube); }
   /// Once the parts of a cube have changed: as OcTree::updateNode() does.
   void fold(Node* node, const OctreeCube& cube) {
     if (!tree_.pruneNode(node)) return node->updateOccupancyChildren();

@@ -9,6 +9,7 @@
 #include "obstacle/radix_sort.h"
 #include "obstacle/voxel_bits.h"
 #include "octomap/camera_fit.h"
+#include "octomap/point_places.h"
 
 namespace dccd {
 namespace {
@@ -48,16 +49,22 @@ std::size_t ViewReader::memoryBytes() const {
          passed.memoryBytes();
 }
 
-/// pointAt(i, u, v, place, depth): `place` is that of a point, relative to the sensor, along the map's axes, in voxels.
-template <class PointAt>
-void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, float* depths, const PointAt& pointAt,
-                            SeenCounts& counts) {
+/// takeInto(first, places): finds the places of `places.count` points or pixels from the first one on. kindOf(i): of
+/// one without a place.
+template <class TakeInto, class KindOf>
+void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, float* depths, const TakeInto& takeInto,
+                            const KindOf& kindOf, SeenCounts& counts) {
   const Vector3d sensor = limits.voxels(view.map_from_sensor.translation());
   const double scale = limits.voxels_per_m, near2 = std::pow(limits.near_m * scale, 2);
   const double fill2 = std::pow(limits.fill_m * scale, 2), clear = limits.clear_m * scale, clear2 = clear * clear;
   // What lies further away ends in no voxel that is cleared.
   const double keep2 = view.clears ? std::pow(clear + DIAGONAL, 2) : 0;
-  const Eigen::Array3d lo = limits.lo.array().max(0.0), hi = limits.hi.array().min(65536.0);
+  PlaceLimits grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    grid.sensor[axis] = sensor[axis];
+    grid.lo[axis] = std::max(limits.lo[axis], 0.0);
+    grid.hi[axis] = std::min(limits.hi[axis], 65536.0);
+  }
   const float no_return = counts.no_return_cleared ? NO_RETURN : NOTHING;
   const bool takes_rays = !depths && view.clears;
   recent_.assign(std::size_t{1} << RECENT_BITS, ~std::uint64_t{0});
@@ -68,40 +75,41 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
     return is_new;
   };
   std::int32_t last[3] = {-1, -1, -1};
-  std::uint64_t last_fills = 0;
-  std::size_t i = 0;
-  for (std::size_t v = 0; v < view.height; ++v) {
-    for (std::size_t u = 0; u < view.width; ++u, ++i) {
-      Vector3d place;
-      float depth = NOTHING;
-      const Kind kind = pointAt(i, u, v, place, depth);
-      const double away2 = kind == Kind::POINT ? place.squaredNorm() : 0;
+  bool last_fills = false;
+  PointPlaces places;
+  const std::size_t all = view.width * view.height;
+  for (std::size_t first = 0; first < all; first += places.count) {
+    places.count = std::min(PointPlaces::MOST, view.width - first % view.width);  // of one row
+    takeInto(first, grid, places);
+    for (std::size_t i = 0; i < places.count; ++i) {
+      const double away2 = places.away2[i];
       if (away2 == 0 || away2 < near2) {
+        const Kind kind = away2 == 0 ? kindOf(first + i) : Kind::POINT;
         ++(kind == Kind::POINT ? counts.near : kind == Kind::NO_RETURN ? counts.no_return : counts.nothing);
-        if (depths) depths[i] = kind == Kind::NO_RETURN ? no_return : NOTHING;
+        if (depths) depths[first + i] = kind == Kind::NO_RETURN ? no_return : NOTHING;
         continue;
       }
-      if (depths) depths[i] = depth;
-      const Vector3d at = sensor + place;
+      if (depths) depths[first + i] = places.depth[i];
       if (takes_rays) {
         const bool is_clipped = away2 > clear2;
-        const Vector3d end = is_clipped ? sensor + place * (clear / std::sqrt(away2)) : at;
+        const Vector3d end =
+            is_clipped ? Vector3d(sensor + places.at(i) * (clear / std::sqrt(away2))) : Vector3d(sensor + places.at(i));
         if (isNew(cellWord(RAYS_A_VOXEL * end) << 1 | is_clipped)) passed.add(sensor, end);
       }
-      const bool is_far = away2 > fill2, is_in = (at.array() >= lo).all() && (at.array() < hi).all();
-      if (!is_in && !is_far && (at.array() >= limits.lo.array()).all() && (at.array() < limits.hi.array()).all()) {
-        checkSpan("a point lies at", at, limits);
+      const bool is_far = away2 > fill2, is_in = places.is_in[i] != 0;
+      if (!is_in && !is_far) {
+        const Vector3d at = sensor + places.at(i);
+        const bool is_wanted = (at.array() >= limits.lo.array()).all() && (at.array() < limits.hi.array()).all();
+        if (is_wanted) checkSpan("a point lies at", at, limits);
       }
       ++(is_far ? counts.far : is_in ? counts.filled : counts.outside);
       if (!is_in || (is_far && away2 > keep2)) continue;
-      const std::uint64_t fills = is_far ? 0 : 1;
-      std::int32_t key[3];
-      for (int axis = 0; axis < 3; ++axis) key[axis] = static_cast<std::int32_t>(at[axis]);
-      if (((key[0] ^ last[0]) | (key[1] ^ last[1]) | (key[2] ^ last[2])) == 0 && fills == last_fills) continue;
-      for (int axis = 0; axis < 3; ++axis) last[axis] = key[axis];
-      last_fills = fills;
-      const auto bits = [&](int axis) { return static_cast<std::uint32_t>(key[axis]); };
-      const std::uint64_t word = endWord(mortonCode(bits(0), bits(1), bits(2)), fills != 0);
+      const std::int32_t x = places.key[0][i], y = places.key[1][i], z = places.key[2][i];
+      if (((x ^ last[0]) | (y ^ last[1]) | (z ^ last[2])) == 0 && is_far != last_fills) continue;
+      last[0] = x, last[1] = y, last[2] = z;
+      last_fills = !is_far;
+      const auto bits = [](std::int32_t key) { return static_cast<std::uint32_t>(key); };
+      const std::uint64_t word = endWord(mortonCode(bits(x), bits(y), bits(z)), !is_far);
       if (isNew(~word)) ends.push_back(word);
     }
   }
@@ -132,34 +140,28 @@ SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, st
   float* const depths = camera && view.clears ? picture.depths(view.width, view.height) : nullptr;
   if (view.depth_m) {
     const Pinhole& lens = view.pinhole;
-    const Vector3d first = from_meters * Vector3d(-lens.cx / lens.fx, -lens.cy / lens.fy, 1);
+    const Vector3d corner = from_meters * Vector3d(-lens.cx / lens.fx, -lens.cy / lens.fy, 1);
     const Vector3d right = from_meters.col(0) / lens.fx, down = from_meters.col(1) / lens.fy;
-    readPoints(
-        view, limits, depths,
-        [&](std::size_t i, std::size_t u, std::size_t v, Vector3d& place, float& depth) {
-          const float z = view.depth_m[i];
-          if (z == NO_RETURN) return Kind::NO_RETURN;
-          if (std::isnan(z) || z == -NO_RETURN) return Kind::NOTHING;
-          depth = z;
-          place = (first + right * double(u) + down * double(v)) * double(std::max(z, 0.0f));
-          return Kind::POINT;
-        },
-        counts);
+    const auto take = [&](std::size_t first, const PlaceLimits& grid, PointPlaces& places) {
+      const auto v = static_cast<double>(first / view.width), u = static_cast<double>(first % view.width);
+      placeDepths(view.depth_m + first, corner + down * v + right * u, right, grid, places);
+    };
+    const auto kindOf = [&](std::size_t i) {
+      const float z = view.depth_m[i];
+      return z == NO_RETURN ? Kind::NO_RETURN : std::isnan(z) || z == -NO_RETURN ? Kind::NOTHING : Kind::POINT;
+    };
+    readPoints(view, limits, depths, take, kindOf, counts);
   } else {
     const Vector3d ahead = camera ? Vector3d(camera->camera_from_sensor.row(2)) : Vector3d(0, 0, 0);
-    readPoints(
-        view, limits, depths,
-        [&](std::size_t i, std::size_t, std::size_t, Vector3d& place, float& depth) {
-          const float *p = view.xyz + 3 * i, x = p[0], y = p[1], z = p[2];
-          if (!(x * 0 + y * 0 + z * 0 == 0)) {
-            return x == NO_RETURN || y == NO_RETURN || z == NO_RETURN ? Kind::NO_RETURN : Kind::NOTHING;
-          }
-          const Vector3d point(x, y, z);
-          place = from_meters * point;
-          depth = static_cast<float>(ahead.dot(point));
-          return Kind::POINT;
-        },
-        counts);
+    const auto take = [&](std::size_t first, const PlaceLimits& grid, PointPlaces& places) {
+      placePoints(view.xyz + 3 * first, from_meters, ahead, grid, places);
+    };
+    const auto kindOf = [&](std::size_t i) {
+      const float *p = view.xyz + 3 * i, x = p[0], y = p[1], z = p[2];
+      if (x * 0 + y * 0 + z * 0 == 0) return Kind::POINT;
+      return x == NO_RETURN || y == NO_RETURN || z == NO_RETURN ? Kind::NO_RETURN : Kind::NOTHING;
+    };
+    readPoints(view, limits, depths, take, kindOf, counts);
   }
   radixSort(ends, other_);
   if (!view.clears) return counts;

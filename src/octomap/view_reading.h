@@ -37,9 +37,9 @@ class ViewReader {
  private:
   std::vector<std::uint64_t> recent_, other_;
 
-  template <class PointAt>
-  void readPoints(const SensorView& view, const ViewLimits& limits, float* depths, const PointAt& pointAt,
-                  SeenCounts& counts);
+  template <class TakeInto, class KindOf>
+  void readPoints(const SensorView& view, const ViewLimits& limits, float* depths, const TakeInto& takeInto,
+                  const KindOf& kindOf, SeenCounts& counts);
 };
 
 }  // namespace dccd

@@ -74,8 +74,8 @@ class ReachSearch {
         gone_m += way_m;
         continue;
       }
-      const int places = std::min<int>(tolerance::MOST_OWN_PLACES,
-                                       static_cast<int>(std::min(1e6, std::ceil(way_m / step_m))));
+      const int places =
+          std::min<int>(tolerance::MOST_OWN_PLACES, static_cast<int>(std::min(1e6, std::ceil(way_m / step_m))));
       // Where it goes on its beginning is the next one's end.
       searchAlong(body, path[i], places, goes_on && places > 0 ? places - 1 : places, map_from_fixed);
       gone_m = !goes_on ? std::numeric_limits<double>::infinity() : places > 0 ? way_m / places : 0;

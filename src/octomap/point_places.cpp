@@ -1,0 +1,92 @@
+#include "octomap/point_places.h"
+
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "octomap/point_places.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+// Plain loops: the compiler makes vectors of them for each target.
+HWY_BEFORE_NAMESPACE();
+namespace dccd {
+namespace HWY_NAMESPACE {
+
+void locateAxis(const double* HWY_RESTRICT place, size_t count, double sensor, double lo, double hi,
+                int32_t* HWY_RESTRICT key, int32_t* HWY_RESTRICT is_in) {
+  for (size_t i = 0; i < count; ++i) {
+    const double at = sensor + place[i];
+    const bool within = (at >= lo) & (at < hi);
+    key[i] = static_cast<int32_t>(within ? at : 0.0);
+    is_in[i] &= within ? 1 : 0;
+  }
+}
+
+void locate(const PlaceLimits& limits, PointPlaces& places) {
+  const size_t count = places.count;
+  for (size_t i = 0; i < count; ++i) {
+    places.away2[i] = places.x[i] * places.x[i] + places.y[i] * places.y[i] + places.z[i] * places.z[i];
+  }
+  for (size_t i = 0; i < count; ++i) places.is_in[i] = 1;
+  const double* const axes[3] = {places.x, places.y, places.z};
+  for (int a = 0; a < 3; ++a) {
+    locateAxis(axes[a], count, limits.sensor[a], limits.lo[a], limits.hi[a], places.key[a], places.is_in);
+  }
+}
+
+void PlaceDepths(const float* HWY_RESTRICT depth_m, const double* HWY_RESTRICT first, const double* HWY_RESTRICT right,
+                 const PlaceLimits& limits, PointPlaces& places) {
+  const size_t count = places.count;
+  constexpr float LARGEST = std::numeric_limits<float>::max();
+  double* const axes[3] = {places.x, places.y, places.z};
+  for (size_t i = 0; i < count; ++i) {
+    const float z = depth_m[i];
+    places.depth[i] = (z > 0) & (z <= LARGEST) ? z : 0.0f;
+  }
+  for (int a = 0; a < 3; ++a) {
+    const double begin = first[a], step = right[a];
+    double* HWY_RESTRICT const out = axes[a];
+    for (size_t i = 0; i < count; ++i) {
+      out[i] = (begin + step * static_cast<int32_t>(i)) * static_cast<double>(places.depth[i]);
+    }
+  }
+  locate(limits, places);
+}
+
+void PlacePoints(const float* HWY_RESTRICT xyz, const double* HWY_RESTRICT m, const double* HWY_RESTRICT ahead,
+                 const PlaceLimits& limits, PointPlaces& places) {
+  const size_t count = places.count;
+  for (size_t i = 0; i < count; ++i) {
+    const float *p = xyz + 3 * i, sum = p[0] * 0 + p[1] * 0 + p[2] * 0;
+    const bool is_point = sum == 0;
+    const double x = is_point ? p[0] : 0.0f, y = is_point ? p[1] : 0.0f, z = is_point ? p[2] : 0.0f;
+    places.x[i] = m[0] * x + m[3] * y + m[6] * z;
+    places.y[i] = m[1] * x + m[4] * y + m[7] * z;
+    places.z[i] = m[2] * x + m[5] * y + m[8] * z;
+    places.depth[i] = static_cast<float>(ahead[0] * x + ahead[1] * y + ahead[2] * z);
+  }
+  locate(limits, places);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace dccd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace dccd {
+
+HWY_EXPORT(PlaceDepths);
+HWY_EXPORT(PlacePoints);
+
+void placeDepths(const float* depth_m, const Eigen::Vector3d& first, const Eigen::Vector3d& right,
+                 const PlaceLimits& limits, PointPlaces& places) {
+  HWY_DYNAMIC_DISPATCH(PlaceDepths)(depth_m, first.data(), right.data(), limits, places);
+}
+
+void placePoints(const float* xyz, const Eigen::Matrix3d& from_sensor, const Eigen::Vector3d& ahead,
+                 const PlaceLimits& limits, PointPlaces& places) {
+  HWY_DYNAMIC_DISPATCH(PlacePoints)(xyz, from_sensor.data(), ahead.data(), limits, places);
+}
+
+}  // namespace dccd
+#endif
