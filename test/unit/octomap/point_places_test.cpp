@@ -1,0 +1,107 @@
+#include "octomap/point_places.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "support/simd_targets.h"
+
+namespace dccd {
+namespace {
+
+constexpr float INFINITE = std::numeric_limits<float>::infinity(), NOTHING = std::numeric_limits<float>::quiet_NaN();
+constexpr float LARGEST = std::numeric_limits<float>::max();
+
+const PlaceLimits GRID{{32768.25, 32700, 32768}, {32760, 0, 32768}, {32800, 65536, 32770.5}};
+
+/// A place, number by number in plain doubles.
+struct Place {
+  Eigen::Vector3d at;
+  float depth = 0;
+};
+
+void expectPlaces(const PointPlaces& places, const std::vector<Place>& expected, const std::string& target) {
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const Eigen::Vector3d& p = expected[i].at;
+    bool is_in = true;
+    std::int32_t keys[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = GRID.sensor[axis] + p[axis];
+      is_in = is_in && at >= GRID.lo[axis] && at < GRID.hi[axis];
+      keys[axis] = static_cast<std::int32_t>(std::floor(std::fmin(std::fmax(at, 0), 65535)));
+    }
+    EXPECT_EQ(places.at(i), p) << target << ' ' << i;
+    EXPECT_EQ(places.away2[i], p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) << target << ' ' << i;
+    EXPECT_EQ(places.depth[i], expected[i].depth) << target << ' ' << i;
+    EXPECT_EQ(places.is_in[i], is_in ? 1 : 0) << target << ' ' << i << ": " << p.transpose();
+    for (int axis = 0; is_in && axis < 3; ++axis) EXPECT_EQ(places.key[axis][i], keys[axis]) << target << ' ' << i;
+  }
+}
+
+/// Numbers of all sizes and kinds, and some at the limits.
+std::vector<float> numbers(std::size_t count) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> small(-3, 40);
+  std::uniform_int_distribution<int> which(0, 19);
+  const float odd[] = {0, -0.0f, INFINITE, -INFINITE, NOTHING, LARGEST, -LARGEST, 1e-44f, -1.0f, 1e30f};
+  std::vector<float> values(count);
+  for (float& value : values) {
+    const int kind = which(random);
+    value = kind < 10 ? small(random) : kind < 15 ? std::floor(small(random)) : odd[2 * (kind - 15) + random() % 2];
+  }
+  return values;
+}
+
+TEST(PointPlaces, OfDepthsAreThoseOfPlainNumbersOnEachTarget) {
+  const Eigen::Vector3d first(-0.5, 0.25, 1.0 / 3), right(1.0 / 512, -1e-3, 1e-5);
+  for (const std::size_t count : {std::size_t{1}, std::size_t{7}, std::size_t{321}, PointPlaces::MOST}) {
+    const std::vector<float> depths = numbers(count);
+    std::vector<Place> expected(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool is_ahead = std::isfinite(depths[i]) && depths[i] > 0;
+      expected[i].depth = is_ahead ? depths[i] : 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        expected[i].at[axis] = (first[axis] + right[axis] * double(i)) * double(expected[i].depth);
+      }
+    }
+    test::forEachTarget([&](const std::string& target) {
+      const auto places = std::make_unique<PointPlaces>();
+      places->count = count;
+      placeDepths(depths.data(), first, right, GRID, *places);
+      expectPlaces(*places, expected, target);
+    });
+  }
+}
+
+TEST(PointPlaces, OfPointsAreThoseOfPlainNumbersOnEachTarget) {
+  Eigen::Matrix3d m;
+  m << 0.3, -0.7, 0.1, 0.9, 0.2, -0.4, 1e-3, 0.5, 0.8;
+  const Eigen::Vector3d ahead(0.1, -0.2, 0.97);
+  for (const std::size_t count : {std::size_t{1}, std::size_t{7}, std::size_t{321}, PointPlaces::MOST}) {
+    const std::vector<float> xyz = numbers(3 * count);
+    std::vector<Place> expected(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const float* p = &xyz[3 * i];
+      if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) {
+        expected[i].at.setZero();
+        continue;
+      }
+      const double x = p[0], y = p[1], z = p[2];
+      for (int axis = 0; axis < 3; ++axis) expected[i].at[axis] = m(axis, 0) * x + m(axis, 1) * y + m(axis, 2) * z;
+      expected[i].depth = static_cast<float>(ahead[0] * x + ahead[1] * y + ahead[2] * z);
+    }
+    test::forEachTarget([&](const std::string& target) {
+      const auto places = std::make_unique<PointPlaces>();
+      places->count = count;
+      placePoints(xyz.data(), m, ahead, GRID, *places);
+      expectPlaces(*places, expected, target);
+    });
+  }
+}
+
+}  // namespace
+}  // namespace dccd
