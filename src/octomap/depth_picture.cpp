@@ -107,8 +107,9 @@ Seen DepthPicture::look(const OctreeCube& cube) {
   const Eigen::Vector3d at = project_ * center, reach = half * spread_;
   const double margin = DEPTH_ROUNDING * (std::abs(at[2]) + reach[2]);
   const double nearest = at[2] - reach[2] - margin, farthest = at[2] + reach[2] + margin;
-  const double away = center.norm(), radius = SQRT3 * half;
-  if (farthest <= 0 || away - radius > geometry_.range) return Seen::NONE;
+  const double away2 = center.squaredNorm(), radius = SQRT3 * half;
+  const double out = geometry_.range + radius, in = std::max(0.0, geometry_.range - radius);
+  if (farthest <= 0 || away2 > out * out) return Seen::NONE;
   const double of_near = nearest > 0 ? 1 / nearest : std::numeric_limits<double>::infinity(), of_far = 1 / farthest;
   const double off = geometry_.off_px + ROUNDING_PX;
   const auto pixels = [&](int axis, double middle, std::int32_t count, std::int32_t& first, std::int32_t& last) {
@@ -141,7 +142,7 @@ Seen DepthPicture::look(const OctreeCube& cube) {
   farthest_m_ = farthest;
   const double side = square_px_ / farthest - 2 * off;
   const bool all_pass = is_inside && nearest > 0 && static_cast<double>(least) > farthest && side >= 1 &&
-                        hole < std::min<double>(std::floor(side), MOST_HOLE) && away + radius <= geometry_.range;
+                        hole < std::min<double>(std::floor(side), MOST_HOLE) && away2 <= in * in;
   if (all_pass) return Seen::ALL;
   const auto inside = [&](int axis, double middle, std::int32_t lo, std::int32_t hi) {
     const double to = at[2] > 0 ? middle + at[axis] / at[2] : 0.5 * (lo + hi);

@@ -22,6 +22,24 @@ void locateAxis(const double* HWY_RESTRICT place, size_t count, double sensor, d
   }
 }
 
+void findRepeats(const PlaceLimits& limits, PointPlaces& places) {
+  const size_t count = places.count;
+  const int32_t* const x = places.key[0];
+  const int32_t* const y = places.key[1];
+  const int32_t* const z = places.key[2];
+  int32_t within[PointPlaces::MOST];
+  for (size_t i = 0; i < count; ++i) {
+    const double away2 = places.away2[i];
+    const bool is_within = (away2 > 0) & (away2 >= limits.nearest2) & (away2 <= limits.farthest2);
+    within[i] = is_within ? places.is_in[i] : 0;
+  }
+  places.repeats[0] = 0;
+  for (size_t i = 1; i < count; ++i) {
+    const int32_t differs = (x[i] ^ x[i - 1]) | (y[i] ^ y[i - 1]) | (z[i] ^ z[i - 1]);
+    places.repeats[i] = within[i] & within[i - 1] & (differs == 0 ? 1 : 0);
+  }
+}
+
 void locate(const PlaceLimits& limits, PointPlaces& places) {
   const size_t count = places.count;
   for (size_t i = 0; i < count; ++i) {
@@ -32,6 +50,7 @@ void locate(const PlaceLimits& limits, PointPlaces& places) {
   for (int a = 0; a < 3; ++a) {
     locateAxis(axes[a], count, limits.sensor[a], limits.lo[a], limits.hi[a], places.key[a], places.is_in);
   }
+  findRepeats(limits, places);
 }
 
 void PlaceDepths(const float* HWY_RESTRICT depth_m, const double* HWY_RESTRICT first, const double* HWY_RESTRICT right,

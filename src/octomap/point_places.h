@@ -17,6 +17,9 @@ struct PointPlaces {
   float depth[MOST];
   std::int32_t key[3][MOST];  ///< of those that are in
   std::int32_t is_in[MOST];   ///< the limits: 1, or 0
+  /// 1: as the one before it lies in the limits, further away than nothing, at the least the nearest and at the most
+  /// the farthest, and in the same voxel. Else 0.
+  std::int32_t repeats[MOST];
 
   Eigen::Vector3d at(std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
@@ -24,6 +27,7 @@ struct PointPlaces {
 /// [voxels] From the corner of the voxel whose key is 0. The limits are within 0 and 65536; hi is exclusive.
 struct PlaceLimits {
   double sensor[3], lo[3], hi[3];
+  double nearest2, farthest2;  ///< squares of distances from the sensor
 };
 
 /// Of `places.count` pixels of a row of depths [m]: a pixel of depth 1 m lies at `first`, each next one `right` of it.

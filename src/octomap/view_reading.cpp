@@ -65,6 +65,8 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
     grid.lo[axis] = std::max(limits.lo[axis], 0.0);
     grid.hi[axis] = std::min(limits.hi[axis], 65536.0);
   }
+  grid.nearest2 = near2;
+  grid.farthest2 = fill2;
   const float no_return = counts.no_return_cleared ? NO_RETURN : NOTHING;
   const bool takes_rays = !depths && view.clears;
   recent_.assign(std::size_t{1} << RECENT_BITS, ~std::uint64_t{0});
@@ -81,7 +83,12 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
   for (std::size_t first = 0; first < all; first += places.count) {
     places.count = std::min(PointPlaces::MOST, view.width - first % view.width);  // of one row
     takeInto(first, grid, places);
+    if (depths) std::copy(places.depth, places.depth + places.count, depths + first);
     for (std::size_t i = 0; i < places.count; ++i) {
+      if (!takes_rays && places.repeats[i] != 0) {
+        ++counts.filled;
+        continue;
+      }
       const double away2 = places.away2[i];
       if (away2 == 0 || away2 < near2) {
         const Kind kind = away2 == 0 ? kindOf(first + i) : Kind::POINT;
@@ -89,7 +96,6 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
         if (depths) depths[first + i] = kind == Kind::NO_RETURN ? no_return : NOTHING;
         continue;
       }
-      if (depths) depths[first + i] = places.depth[i];
       if (takes_rays) {
         const bool is_clipped = away2 > clear2;
         const Vector3d end =

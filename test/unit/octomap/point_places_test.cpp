@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -16,7 +17,7 @@ namespace {
 constexpr float INFINITE = std::numeric_limits<float>::infinity(), NOTHING = std::numeric_limits<float>::quiet_NaN();
 constexpr float LARGEST = std::numeric_limits<float>::max();
 
-const PlaceLimits GRID{{32768.25, 32700, 32768}, {32760, 0, 32768}, {32800, 65536, 32770.5}};
+const PlaceLimits GRID{{32768.25, 32700, 32768}, {32760, 0, 32768}, {32800, 65536, 32770.5}, 0.01, 900};
 
 /// A place, number by number in plain doubles.
 struct Place {
@@ -24,7 +25,11 @@ struct Place {
   float depth = 0;
 };
 
-void expectPlaces(const PointPlaces& places, const std::vector<Place>& expected, const std::string& target) {
+/// True: some repeat the one before.
+bool expectPlaces(const PointPlaces& places, const std::vector<Place>& expected, const std::string& target) {
+  bool some_repeat = false;
+  bool was_within = false;
+  std::int32_t last[3] = {};
   for (std::size_t i = 0; i < expected.size(); ++i) {
     const Eigen::Vector3d& p = expected[i].at;
     bool is_in = true;
@@ -39,7 +44,15 @@ void expectPlaces(const PointPlaces& places, const std::vector<Place>& expected,
     EXPECT_EQ(places.depth[i], expected[i].depth) << target << ' ' << i;
     EXPECT_EQ(places.is_in[i], is_in ? 1 : 0) << target << ' ' << i << ": " << p.transpose();
     for (int axis = 0; is_in && axis < 3; ++axis) EXPECT_EQ(places.key[axis][i], keys[axis]) << target << ' ' << i;
+    const double away2 = places.away2[i];
+    const bool is_within = is_in && away2 > 0 && away2 >= GRID.nearest2 && away2 <= GRID.farthest2;
+    const bool repeats = is_within && was_within && std::equal(keys, keys + 3, last);
+    EXPECT_EQ(places.repeats[i], repeats ? 1 : 0) << target << ' ' << i;
+    some_repeat = some_repeat || repeats;
+    was_within = is_within;
+    std::copy(keys, keys + 3, last);
   }
+  return some_repeat;
 }
 
 /// Numbers of all sizes and kinds, and some at the limits.
@@ -49,7 +62,12 @@ std::vector<float> numbers(std::size_t count) {
   std::uniform_int_distribution<int> which(0, 19);
   const float odd[] = {0, -0.0f, INFINITE, -INFINITE, NOTHING, LARGEST, -LARGEST, 1e-44f, -1.0f, 1e30f};
   std::vector<float> values(count);
-  for (float& value : values) {
+  for (std::size_t i = 0; i < count; ++i) {
+    float& value = values[i];
+    if (i >= 3 && which(random) < 12) {  // as some before it
+      value = values[i - 3];
+      continue;
+    }
     const int kind = which(random);
     value = kind < 10 ? small(random) : kind < 15 ? std::floor(small(random)) : odd[2 * (kind - 15) + random() % 2];
   }
@@ -72,7 +90,7 @@ TEST(PointPlaces, OfDepthsAreThoseOfPlainNumbersOnEachTarget) {
       const auto places = std::make_unique<PointPlaces>();
       places->count = count;
       placeDepths(depths.data(), first, right, GRID, *places);
-      expectPlaces(*places, expected, target);
+      EXPECT_EQ(expectPlaces(*places, expected, target), count > 100) << target;
     });
   }
 }
@@ -98,7 +116,7 @@ TEST(PointPlaces, OfPointsAreThoseOfPlainNumbersOnEachTarget) {
       const auto places = std::make_unique<PointPlaces>();
       places->count = count;
       placePoints(xyz.data(), m, ahead, GRID, *places);
-      expectPlaces(*places, expected, target);
+      EXPECT_EQ(expectPlaces(*places, expected, target), count > 100) << target;
     });
   }
 }
