@@ -11,6 +11,8 @@ constexpr float NOWHERE = std::numeric_limits<float>::infinity();
 constexpr double SQRT2 = 1.4142135623730951, SQRT3 = 1.7320508075688772;
 // Of a coordinate, of a depth as a float, and of a pixel: more than what the numbers cannot tell.
 constexpr double ROUNDING = 1e-9, DEPTH_ROUNDING = 1e-6, ROUNDING_PX = 1e-3;
+// Rays that nearly cross a voxel: if none of so many does, it stays. Beside the sensor all of them nearly do.
+constexpr int MOST_TRIED = 64;
 
 }  // namespace
 
@@ -165,6 +167,7 @@ bool DepthPicture::crosses(const OctreeCube& cube) const {
     right[axis] = static_cast<float>(pixel_ways_(axis, 0));
   }
   const float nearest = static_cast<float>(nearest_m_);
+  int tried = 0;
   for (std::int32_t v = area_.v0; v <= area_.v1; ++v) {
     const float* const depths = &levels_[0].nearest[static_cast<std::size_t>(v) * levels_[0].width + area_.u0];
     const Eigen::Vector3f first = (pixel_ways_ * Eigen::Vector3d(area_.u0, v, 1)).cast<float>();
@@ -182,7 +185,9 @@ bool DepthPicture::crosses(const OctreeCube& cube) const {
     int any = 0;
     for (std::int32_t i = 0; i < count; ++i) any |= reaches(i);
     for (std::int32_t i = 0; any != 0 && i < count; ++i) {
-      if (reaches(i) != 0 && passes(area_.u0 + i, v, cube)) return true;
+      if (reaches(i) == 0) continue;
+      if (passes(area_.u0 + i, v, cube)) return true;
+      if (++tried == MOST_TRIED) return false;
     }
   }
   return false;

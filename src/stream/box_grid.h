@@ -39,7 +39,10 @@ class BoxGrid {
     const auto forEachCell = [&](auto&& take) {
       for (std::size_t i = 0; i < count; ++i) {
         const auto& box = boxOf(i);
-        visitCells(&box.lo[0], &box.hi[0], [&](std::size_t cell) { take(i, cell); });
+        anyCell(&box.lo[0], &box.hi[0], [&](std::size_t cell) {
+          take(i, cell);
+          return false;
+        });
       }
     };
     forEachCell([&](std::size_t, std::size_t cell) { ++first_[cell + 1]; });
@@ -49,12 +52,23 @@ class BoxGrid {
     forEachCell([&](std::size_t i, std::size_t cell) { listed_[next[cell]++] = static_cast<std::uint32_t>(i); });
   }
 
+  /// Whether test(i) is true of one of the boxes that meet this closed one, and maybe of some more. It may be asked
+  /// more than once of a box, and is not asked on once it was true.
+  template <class Test>
+  bool any(const double* lo, const double* hi, Test&& test) const {
+    return !first_.empty() && anyCell(lo, hi, [&](std::size_t cell) {
+      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+        if (test(listed_[i])) return true;
+      }
+      return false;
+    });
+  }
   /// Calls visit(i) for at least the boxes that meet this closed one; for some more than once.
   template <class Visit>
   void visit(const double* lo, const double* hi, Visit&& visit) const {
-    if (first_.empty()) return;
-    visitCells(lo, hi, [&](std::size_t cell) {
-      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) visit(listed_[i]);
+    any(lo, hi, [&](std::uint32_t i) {
+      visit(i);
+      return false;
     });
   }
 
@@ -67,21 +81,22 @@ class BoxGrid {
   std::int64_t cellOf(double x, int a) const {
     return static_cast<std::int64_t>(std::clamp((x - lo_[a]) * inverse_cell_, 0.0, static_cast<double>(cells_[a] - 1)));
   }
-  template <class Visit>
-  void visitCells(const double* lo, const double* hi, Visit&& visit) const {
+  template <class Test>
+  bool anyCell(const double* lo, const double* hi, const Test& test) const {
     std::array<std::int64_t, 3> low, high;
     for (int a = 0; a < 3; ++a) {
-      if (!(hi[a] >= lo_[a] && lo[a] <= hi_[a])) return;
+      if (!(hi[a] >= lo_[a] && lo[a] <= hi_[a])) return false;
       low[a] = cellOf(lo[a], a);
       high[a] = cellOf(hi[a], a);
     }
     for (std::int64_t z = low[2]; z <= high[2]; ++z) {
       for (std::int64_t y = low[1]; y <= high[1]; ++y) {
         for (std::int64_t x = low[0]; x <= high[0]; ++x) {
-          visit(static_cast<std::size_t>((z * cells_[1] + y) * cells_[0] + x));
+          if (test(static_cast<std::size_t>((z * cells_[1] + y) * cells_[0] + x))) return true;
         }
       }
     }
+    return false;
   }
 };
 

@@ -277,8 +277,9 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   last = outcome.step;
   last_runs = runs;
   outcome.excluded.insert(outcome.excluded.end(), thinned_out.begin(), thinned_out.end());
-  outcome.stats[Effect::OWN_VOXELS].ms += own_voxels_ms;
-  outcome.stats.total_ms += own_voxels_ms;
+  const double own_ms = std::exchange(own_voxels_ms, 0);
+  outcome.stats[Effect::OWN_VOXELS].ms += own_ms;
+  outcome.stats.total_ms += own_ms;
   if (!options.detector.patches) {
     tracker.seam();
     return outcome;

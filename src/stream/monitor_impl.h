@@ -115,7 +115,7 @@ struct Monitor::Impl {
   bool separates(const Body& body) const;
   std::vector<TrackedBody> tracked() const;
   void takeMaps(StampNs known_until_ns);
-  /// For a step that is not wanted: what is own goes on to be followed, as far as the bodies' ways are known.
+  /// Outside of a step: what is own is followed, as far as the bodies' ways are known.
   void followOwnVoxels(StampNs stamp_ns);
   void limitMapsToCome();
   void forgetOwnVoxels(std::size_t body);

@@ -62,7 +62,12 @@ void Monitor::setMap(ObstacleMap map) {
   m.missed_maps.clear();
   m.maps_to_come.push_back(std::move(map));
   m.limitMapsToCome();
-  if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().stamp_ns);
+  if (m.tracked().empty()) {
+    m.takeMaps(m.maps_to_come.back().stamp_ns);
+  } else if (m.pending.empty() && !m.stores[m.options.clock_body].empty()) {
+    // No step to come ends before the newest frame: what is own is told now, and the next answer need not wait for it.
+    m.followOwnVoxels(m.stores[m.options.clock_body].newest().stamp_ns);
+  }
 }
 
 /// Of too many the oldest and the newest ones are kept.
@@ -92,7 +97,6 @@ std::vector<TrackedBody> Monitor::Impl::tracked() const {
 
 /// Until when the bodies' ways are known. Of several maps up to then each is looked at, and the newest is in force.
 void Monitor::Impl::takeMaps(StampNs known_until_ns) {
-  own_voxels_ms = 0;
   if (maps_to_come.empty() && std::any_of(bodies.begin(), bodies.end(), ownsVoxels)) return;
   const std::vector<TrackedBody> bodies_tracked = tracked();
   std::size_t taken = maps_to_come.size();
@@ -107,9 +111,9 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
 void Monitor::Impl::followOwnVoxels(StampNs stamp_ns) try {
   StampNs known_until_ns = stamp_ns;
   for (const TrackedBody& body : tracked()) {
-    if (!body.holds_always && !body.frames->empty()) {
-      known_until_ns = std::min(known_until_ns, body.frames->newest().stamp_ns);
-    }
+    if (body.holds_always) continue;
+    if (body.frames->empty()) return;  // what it reaches would be taken for obstacles
+    known_until_ns = std::min(known_until_ns, body.frames->newest().stamp_ns);
   }
   takeMaps(known_until_ns);
 } catch (const std::bad_alloc&) {

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "dccd/tolerances.h"
 
 namespace dccd {
 namespace {
+
+constexpr double ROUNDING = 1e-12;  // of a coordinate on a straight way between two
 
 /// The point of a triangle that is closest to p (Ericson, Real-Time Collision Detection, 5.1.5), up to rounding: it is
 /// a point of the triangle in any case.
@@ -62,9 +65,20 @@ class ReachSearch {
 
   void search(const TrackedBody& body, const std::vector<MeshStore::Stretch>& path,
               const Eigen::Isometry3d& map_from_fixed) {
-    for (const MeshStore::Stretch& stretch : path) {
-      if (left_ == 0) return;
-      searchAlong(body, stretch, map_from_fixed);
+    double gone_m = std::numeric_limits<double>::infinity();  // since the last place at which it was asked
+    for (std::size_t i = 0; i < path.size() && left_ > 0; ++i) {
+      const MeshStore::Stretch* const older = i + 1 < path.size() ? &path[i + 1] : nullptr;
+      const bool goes_on = older && older->to == path[i].from && older->last == 1 && path[i].first == 0;
+      const double way_m = wayAlong(path[i]), step_m = tolerance::OWN_PLACES * resolution_m_;
+      if (goes_on && gone_m + way_m <= step_m) {
+        gone_m += way_m;
+        continue;
+      }
+      const int places = std::min<int>(tolerance::MOST_OWN_PLACES,
+                                       static_cast<int>(std::min(1e6, std::ceil(way_m / step_m))));
+      // Where it goes on its beginning is the next one's end.
+      searchAlong(body, path[i], places, goes_on && places > 0 ? places - 1 : places, map_from_fixed);
+      gone_m = !goes_on ? std::numeric_limits<double>::infinity() : places > 0 ? way_m / places : 0;
     }
   }
 
@@ -76,41 +90,82 @@ class ReachSearch {
   std::size_t left_;
   std::vector<std::uint64_t> asked_;  // per cube, the last place of a rigid body that came to it
   std::uint64_t place_ = 0;
-  Positions at_;
+  Positions at_, first_at_;
+  std::vector<Face> near_;  // findNear()
 
-  void searchAlong(const TrackedBody& body, const MeshStore::Stretch& stretch,
-                   const Eigen::Isometry3d& map_from_fixed) {
+  /// How far its points go.
+  static double wayAlong(const MeshStore::Stretch& stretch) {
     const MeshFrame &from = *stretch.from, &to = *stretch.to;
-    double way_m = 0;
+    double squared = 0;
     for (std::size_t v = 0; v < to.positions.size(); ++v) {
       const double m = (to.positions[v] - from.positions[v]).squaredNorm();
-      if (m > way_m) way_m = m;
+      if (m > squared) squared = m;
     }
-    way_m = std::sqrt(way_m) * (stretch.last - stretch.first);
-    const int places =
-        std::min<int>(tolerance::MOST_OWN_PLACES,
-                      static_cast<int>(std::min(1e6, std::ceil(way_m / (tolerance::OWN_PLACES * resolution_m_)))));
+    return std::sqrt(squared) * (stretch.last - stretch.first);
+  }
+
+  /// Asks at its end, and at places back to its beginning up to the last one.
+  void searchAlong(const TrackedBody& body, const MeshStore::Stretch& stretch, int places, int last,
+                   const Eigen::Isometry3d& map_from_fixed) {
+    const MeshFrame &from = *stretch.from, &to = *stretch.to;
     RigidShape* const shape = to.rigid && shapes_ ? &(*shapes_)[body.body] : nullptr;
     const bool is_known = shape && to.topology->hasFaces() && shape->isOf(to, resolution_m_);
-    for (int i = 0; i <= places && left_ > 0; ++i) {
+    if (!to.rigid) findNear(body, stretch, map_from_fixed);
+    for (int i = 0; i <= last && left_ > 0; ++i) {
       const double u = places == 0 ? stretch.last : stretch.last + (stretch.first - stretch.last) * i / places;
-      if (to.rigid) {
-        const Eigen::Isometry3d map_from_body = map_from_fixed * interpolate(from.pose, to.pose, u);
-        const Eigen::Isometry3d moved = map_from_body * to.pose.inverse();
-        if (is_known && askRigid(body, to, *shape, map_from_body, moved)) continue;
-        at_.resize(to.positions.size());
-        for (std::size_t v = 0; v < at_.size(); ++v) at_[v] = moved * to.positions[v];
-      } else {
-        at_.resize(to.positions.size());
+      at_.resize(to.positions.size());
+      if (!to.rigid) {
+        if (near_.empty()) return;
         interpolate(from.positions, to.positions, u, at_);
         for (Vec3& p : at_) p = map_from_fixed * p;
+        for (const Face& f : near_) ask(body, {at_[f[0]], at_[f[1]], at_[f[2]]});
+        continue;
       }
+      const Eigen::Isometry3d map_from_body = map_from_fixed * interpolate(from.pose, to.pose, u);
+      const Eigen::Isometry3d moved = map_from_body * to.pose.inverse();
+      if (is_known && askRigid(body, to, *shape, map_from_body, moved)) continue;
+      for (std::size_t v = 0; v < at_.size(); ++v) at_[v] = moved * to.positions[v];
       const Topology& topology = *to.topology;
-      for (const Face& f : topology.faces()) ask(body, {at_[f[0]], at_[f[1]], at_[f[2]]});
-      if (to.rigid && topology.isClosed() && !body.shell) askInside(body, topology);
-      if (topology.hasFaces()) continue;
-      for (const Edge& e : topology.edges()) ask(body, {at_[e[0]], at_[e[1]], at_[e[1]]});
+      visitElements(topology, [&](const Face& f) { ask(body, {at_[f[0]], at_[f[1]], at_[f[2]]}); });
+      if (topology.isClosed() && !body.shell) askInside(body, topology);
     }
+  }
+
+  /// Its faces, or if it has none its edges, as faces of two corners.
+  template <class Visit>
+  static void visitElements(const Topology& topology, const Visit& visit) {
+    for (const Face& f : topology.faces()) visit(f);
+    if (topology.hasFaces()) return;
+    for (const Edge& e : topology.edges()) visit(Face{e[0], e[1], e[1]});
+  }
+
+  /// Of a body whose points go straight: the faces that come to a cube on their way. Most of them do not.
+  void findNear(const TrackedBody& body, const MeshStore::Stretch& stretch, const Eigen::Isometry3d& map_from_fixed) {
+    const auto placed = [&](double u, Positions& at) {
+      at.resize(stretch.to->positions.size());
+      interpolate(stretch.from->positions, stretch.to->positions, u, at);
+      for (Vec3& p : at) p = map_from_fixed * p;
+    };
+    placed(stretch.first, first_at_);
+    placed(stretch.last, at_);
+    near_.clear();
+    visitElements(*stretch.to->topology, [&](const Face& f) {
+      Vec3 lo = at_[f[0]], hi = lo;
+      for (const Index v : f) {
+        lo = lo.cwiseMin(at_[v]).cwiseMin(first_at_[v]);
+        hi = hi.cwiseMax(at_[v]).cwiseMax(first_at_[v]);
+      }
+      const double more_m = body.reach_m + ROUNDING * (body.reach_m + lo.cwiseAbs().cwiseMax(hi.cwiseAbs()).maxCoeff());
+      lo.array() -= more_m;
+      hi.array() += more_m;
+      bool is_near = !lo.allFinite() || !hi.allFinite();  // a lost vertex may be there at one end of the way
+      grid_.visit(lo.data(), hi.data(), [&](std::uint32_t i) {
+        const LeafBox& box = cubes_[i].box;
+        is_near = is_near || (cubes_[i].body < 0 && box.lo[0] <= hi[0] && box.lo[1] <= hi[1] && box.lo[2] <= hi[2] &&
+                              box.hi[0] >= lo[0] && box.hi[1] >= lo[1] && box.hi[2] >= lo[2]);
+      });
+      if (is_near) near_.push_back(f);
+    });
   }
 
   void settle(ReachedCube& cube, const TrackedBody& body) {
@@ -153,7 +208,9 @@ class ReachSearch {
     const Vec3 lo = bounds.min().array() - (body.reach_m + slack_m),
                hi = bounds.max().array() + (body.reach_m + slack_m);
     // Where coordinates are that large no face says what it reaches, and a cube may be at the surface.
-    if (!(FaceReach::nearOf(body.reach_m, 2 * lo.cwiseAbs().cwiseMax(hi.cwiseAbs()).maxCoeff()) > 0)) return false;
+    const double sure_m = FaceReach::nearOf(body.reach_m, 2 * lo.cwiseAbs().cwiseMax(hi.cwiseAbs()).maxCoeff());
+    if (!(sure_m > 0)) return false;
+    const double within_m = std::max(0.0, sure_m - slack_m);  // of a cube's middle
     ++place_;
     grid_.visit(lo.data(), hi.data(), [&](std::uint32_t i) {
       ReachedCube& cube = cubes_[i];
@@ -162,14 +219,15 @@ class ReachSearch {
       const double half_m = 0.5 * (Eigen::Map<const Vec3>(cube.box.hi) - Eigen::Map<const Vec3>(cube.box.lo)).norm();
       const double near_m = half_m + body.reach_m + slack_m;
       if (shape.bounds().squaredExteriorDistance(point) > near_m * near_m) return;
-      bool is_reached = false;
-      shape.visitNear(point, near_m, [&](std::uint32_t number) {
-        if (is_reached) return;
+      const bool is_reached = shape.anyNear(point, near_m, [&](std::uint32_t number) {
+        const double away2 = (closestOn(shape.face(number), point) - point).squaredNorm();
+        if (away2 > near_m * near_m) return false;
+        if (away2 < within_m * within_m) return true;
         const Face& f = topology.faces()[number];
         const std::array<Vec3, 3> t{moved * frame.positions[f[0]], moved * frame.positions[f[1]],
                                     moved * frame.positions[f[2]]};
         FaceReach reach;
-        is_reached = reach.find(t, body.reach_m) && reaches(t, reach, cube.box);
+        return reach.find(t, body.reach_m) && reaches(t, reach, cube.box);
       });
       // A cube that no face reaches has its middle half a voxel from all of them at the least.
       if (is_reached || (topology.isClosed() && !body.shell && shape.holds(point))) settle(cube, body);

@@ -2,6 +2,7 @@
 // whether a point is inside of it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -27,15 +28,20 @@ class RigidShape {
 
   static constexpr double SLACK = 1e-6;
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }
-  /// Calls visit(number) for at least the faces within `near_m` of a point of the body's frame, for each once.
-  template <class Visit>
-  void visitNear(const Vec3& point, double near_m, Visit&& visit) {
+  /// Whether test(number) is true of one of the faces within `near_m` of a point of the body's frame, and maybe of some
+  /// more. It is asked of each once at the most, and not on once it was true.
+  template <class Test>
+  bool anyNear(const Vec3& point, double near_m, Test&& test) {
     ++question_;
     const Vec3 lo = point.array() - near_m, hi = point.array() + near_m;
-    faces_.visit(lo.data(), hi.data(), [&](std::uint32_t f) {
-      if (std::exchange(asked_[f], question_) == question_) return;
-      if (boxes_[f].squaredExteriorDistance(point) <= near_m * near_m) visit(f);
+    return faces_.any(lo.data(), hi.data(), [&](std::uint32_t f) {
+      if (std::exchange(asked_[f], question_) == question_) return false;
+      return boxes_[f].squaredExteriorDistance(point) <= near_m * near_m && test(f);
     });
+  }
+  std::array<Vec3, 3> face(std::uint32_t number) const {
+    const Face& f = topology_->faces()[number];
+    return {points_[f[0]], points_[f[1]], points_[f[2]]};
   }
   /// The same as isInside() for a point that is at least half a voxel from the surface of a closed body.
   bool holds(const Vec3& point);
