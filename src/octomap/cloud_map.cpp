@@ -97,14 +97,14 @@ std::vector<std::int8_t> CloudMap::serialized(bool binary) const { return dccd::
 
 SeenCounts CloudMap::insert(const SensorView& view, std::size_t max_bytes) {
   const SeenCounts counts = impl_->reader.read(view, impl_->limits, max_bytes / 2);
-  if (impl_->reader.passed.isFull()) noRoom(max_bytes);
+  if (counts.cleared && !counts.is_picture && impl_->reader.rays.isFull()) noRoom(max_bytes);
   Blind blind;
   if (!counts.cleared) {
     impl_->update(blind, max_bytes);
   } else if (counts.is_picture) {
     impl_->update(impl_->reader.picture, max_bytes);
   } else {
-    impl_->update(impl_->reader.passed, max_bytes);
+    impl_->update(impl_->reader.rays, max_bytes);
   }
   return counts;
 }

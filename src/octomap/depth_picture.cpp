@@ -159,7 +159,9 @@ bool DepthPicture::crosses(const OctreeCube& cube) const {
   if (passes(center_u_, center_v_, cube)) return true;
   // In floats, of a voxel that is a little larger: which pixels may have rays that reach it. At which depth they enter
   // and leave it follows from the ways that pixels look, without their points.
-  const double margin = 1e-3 + 2 * (geometry_.off_px + ROUNDING_PX) * farthest_m_ / square_px_;
+  const bool has_ways = geometry_.ways[0] != nullptr;
+  const double off_px = has_ways ? 0 : geometry_.off_px + ROUNDING_PX;
+  const double margin = 1e-3 + 2 * off_px * farthest_m_ / square_px_;
   float lo[3], hi[3], right[3];
   for (int axis = 0; axis < 3; ++axis) {
     const std::uint32_t key = axis == 0 ? cube.x : axis == 1 ? cube.y : cube.z;
@@ -170,12 +172,17 @@ bool DepthPicture::crosses(const OctreeCube& cube) const {
   const float nearest = static_cast<float>(nearest_m_);
   int tried = 0;
   for (std::int32_t v = area_.v0; v <= area_.v1; ++v) {
-    const float* const depths = &levels_[0].nearest[static_cast<std::size_t>(v) * levels_[0].width + area_.u0];
+    const std::size_t row = static_cast<std::size_t>(v) * levels_[0].width + area_.u0;
+    const float* const depths = &levels_[0].nearest[row];
+    std::array<const float*, 3> ways{};
+    for (int axis = 0; has_ways && axis < 3; ++axis) ways[axis] = geometry_.ways[axis] + row;
     const Eigen::Vector3f first = (pixel_ways_ * Eigen::Vector3d(area_.u0, v, 1)).cast<float>();
     const float first_x = first[0], first_y = first[1], first_z = first[2];
     const auto reaches = [&](std::int32_t i) {
       const float u = static_cast<float>(i);
-      const float x = 1 / (first_x + u * right[0]), y = 1 / (first_y + u * right[1]), z = 1 / (first_z + u * right[2]);
+      const float x = 1 / (has_ways ? ways[0][i] : first_x + u * right[0]);
+      const float y = 1 / (has_ways ? ways[1][i] : first_y + u * right[1]);
+      const float z = 1 / (has_ways ? ways[2][i] : first_z + u * right[2]);
       const float x0 = lo[0] * x, x1 = hi[0] * x, y0 = lo[1] * y, y1 = hi[1] * y, z0 = lo[2] * z, z1 = hi[2] * z;
       const float enters = std::max(std::max(std::min(x0, x1), std::min(y0, y1)), std::min(z0, z1));
       const float leaves = std::min(std::min(std::max(x0, x1), std::max(y0, y1)), std::max(z0, z1));
@@ -201,7 +208,9 @@ bool DepthPicture::passes(std::int32_t u, std::int32_t v, const OctreeCube& cube
   const float depth = all.nearest[pixel];
   if (!(static_cast<double>(depth) > nearest_m_)) return false;
   Eigen::Vector3d end;
-  if (geometry_.xyz && depth < NOWHERE) {
+  if (geometry_.ways[0]) {  // what floats cannot tell is far below the margins
+    for (int axis = 0; axis < 3; ++axis) end[axis] = double(geometry_.ways[axis][pixel]) * double(depth);
+  } else if (geometry_.xyz && depth < NOWHERE) {
     const float* p = geometry_.xyz + 3 * pixel;
     end = geometry_.map_from_xyz * Eigen::Vector3d(p[0], p[1], p[2]);
   } else {

@@ -22,6 +22,8 @@ struct PictureGeometry {
   double resolution_m = 0;
   const float* xyz = nullptr;    ///< [m] the points in the sensor's frame; null: they are what pixel and depth say
   Eigen::Matrix3d map_from_xyz;  ///< with the scale from metres
+  /// Where each pixel's point would be at a depth of 1 m; null: where the middle of the pixel is.
+  std::array<const float*, 3> ways{};
 };
 
 class DepthPicture {

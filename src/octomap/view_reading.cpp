@@ -19,7 +19,6 @@ using Eigen::Vector3d;
 constexpr float NO_RETURN = std::numeric_limits<float>::infinity(), NOTHING = std::numeric_limits<float>::quiet_NaN();
 constexpr double DIAGONAL = 1.7320508075688772;  // of a voxel
 constexpr int RECENT_BITS = 15;
-constexpr double RAYS_A_VOXEL = 2;  // along each axis: of the rays that end in such a part of a voxel, one is enough
 
 enum class Kind : std::uint8_t { POINT, NO_RETURN, NOTHING };
 
@@ -34,19 +33,11 @@ void checkSpan(const char* what, const Vector3d& voxels, const ViewLimits& limit
   throw OctomapError(text.str());
 }
 
-/// A word of its own for each cell of a grid, as far as a map reaches.
-std::uint64_t cellWord(const Vector3d& at) {
-  const auto coordinate = [&](int axis) {
-    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(at[axis]))) & 0x1fffff;
-  };
-  return coordinate(0) | coordinate(1) << 21 | coordinate(2) << 42;
-}
-
 }  // namespace
 
 std::size_t ViewReader::memoryBytes() const {
   return (ends.capacity() + recent_.capacity() + other_.capacity()) * sizeof(std::uint64_t) + picture.memoryBytes() +
-         passed.memoryBytes();
+         rays.memoryBytes();
 }
 
 /// takeInto(first, places): finds the places of `places.count` points or pixels from the first one on. kindOf(i): of
@@ -56,7 +47,7 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
                             const KindOf& kindOf, SeenCounts& counts) {
   const Vector3d sensor = limits.voxels(view.map_from_sensor.translation());
   const double scale = limits.voxels_per_m, near2 = std::pow(limits.near_m * scale, 2);
-  const double fill2 = std::pow(limits.fill_m * scale, 2), clear = limits.clear_m * scale, clear2 = clear * clear;
+  const double fill2 = std::pow(limits.fill_m * scale, 2), clear = limits.clear_m * scale;
   // What lies further away ends in no voxel that is cleared.
   const double keep2 = view.clears ? std::pow(clear + DIAGONAL, 2) : 0;
   PlaceLimits grid;
@@ -68,7 +59,6 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
   grid.nearest2 = near2;
   grid.farthest2 = fill2;
   const float no_return = counts.no_return_cleared ? NO_RETURN : NOTHING;
-  const bool takes_rays = !depths && view.clears;
   recent_.assign(std::size_t{1} << RECENT_BITS, ~std::uint64_t{0});
   const auto isNew = [&](std::uint64_t word) {
     std::uint64_t& last = recent_[word * 0x9e3779b97f4a7c15u >> (64 - RECENT_BITS)];
@@ -85,7 +75,7 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
     takeInto(first, grid, places);
     if (depths) std::copy(places.depth, places.depth + places.count, depths + first);
     for (std::size_t i = 0; i < places.count; ++i) {
-      if (!takes_rays && places.repeats[i] != 0) {
+      if (places.repeats[i] != 0) {
         ++counts.filled;
         continue;
       }
@@ -95,12 +85,6 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
         ++(kind == Kind::POINT ? counts.near : kind == Kind::NO_RETURN ? counts.no_return : counts.nothing);
         if (depths) depths[first + i] = kind == Kind::NO_RETURN ? no_return : NOTHING;
         continue;
-      }
-      if (takes_rays) {
-        const bool is_clipped = away2 > clear2;
-        const Vector3d end =
-            is_clipped ? Vector3d(sensor + places.at(i) * (clear / std::sqrt(away2))) : Vector3d(sensor + places.at(i));
-        if (isNew(cellWord(RAYS_A_VOXEL * end) << 1 | is_clipped)) passed.add(sensor, end);
       }
       const bool is_far = away2 > fill2, is_in = places.is_in[i] != 0;
       if (!is_in && !is_far) {
@@ -131,7 +115,6 @@ static void setLens(const FittedCamera& camera, PictureGeometry& geometry) {
 
 SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, std::size_t most_bytes) {
   ends.clear();
-  passed.clear(most_bytes);
   SeenCounts counts;
   PictureGeometry geometry;
   geometry.sensor = limits.voxels(view.map_from_sensor.translation());
@@ -172,7 +155,7 @@ SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, st
   radixSort(ends, other_);
   if (!view.clears) return counts;
   if (!camera) {
-    passed.sort();
+    rays.read(view, limits, most_bytes);
     return counts;
   }
   geometry.camera_from_map = camera->camera_from_sensor * view.map_from_sensor.linear().transpose();

@@ -7,8 +7,8 @@
 #include <Eigen/Core>
 
 #include "dccd/cloud_map.h"
+#include "octomap/cloud_rays.h"
 #include "octomap/depth_picture.h"
-#include "octomap/passed_voxels.h"
 
 namespace dccd {
 
@@ -28,9 +28,9 @@ class ViewReader {
   /// Words of the voxels in which the view's points end (endWord()), sorted; some more than once.
   std::vector<std::uint64_t> ends;
   DepthPicture picture;  ///< if counts say that it is one, and that it cleared
-  PassedVoxels passed;   ///< if it is none, and cleared
+  CloudRays rays;        ///< if it is none, and cleared
 
-  /// Throws OctomapError for the sensor or a point outside of what a map can span. most_bytes: that `passed` may take.
+  /// Throws OctomapError for the sensor or a point outside of what a map can span. most_bytes: that `rays` may take.
   SeenCounts read(const SensorView& view, const ViewLimits& limits, std::size_t most_bytes);
   std::size_t memoryBytes() const;
 

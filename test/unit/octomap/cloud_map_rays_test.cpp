@@ -294,6 +294,30 @@ TEST(CloudMapRays, OfPointsInNoOrder) {
   }
 }
 
+/// Voxels are far smaller than what lies between two rays, so that most of each ray is followed alone.
+TEST(CloudMapRays, OfFewPointsAllAround) {
+  std::mt19937 random(7);
+  const test::SeenScene scene = test::SeenScene::make(random, Vec3(2.2, 2, 1.4), 12);
+  std::normal_distribution<double> normal(0, 1);
+  for (const bool has_box : {false, true}) {
+    CloudMapOptions options;
+    options.resolution_m = 0.02;
+    if (has_box) options.box = Box{Vec3(-0.7, -0.6, -0.51), Vec3(0.8, 0.5, 0.4)};
+    Held held(options, 0.95);
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Isometry3d pose = somePose(random, 0.3);
+      std::vector<float> xyz;
+      for (int ray = 0; ray < 400; ++ray) {
+        const Vec3 way = Vec3(normal(random), normal(random), normal(random)).normalized();
+        const Vec3 p = way * scene.depth(pose.translation(), pose.linear() * way);
+        for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(p[axis]));
+      }
+      SCOPED_TRACE(i);
+      held.insert(test::viewOf(pose, xyz), false);
+    }
+  }
+}
+
 TEST(CloudMapRays, OfALidar) {
   std::mt19937 random(4);
   const test::SeenScene scene = test::SeenScene::make(random, Vec3(10, 10, 3), 12);

@@ -1,0 +1,232 @@
+#include "octomap/cloud_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "octomap/view_reading.h"
+
+namespace dccd {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+constexpr double CELLS_A_VOXEL = 3;    // along a side, where voxels are the smallest; of 2 too few rays are left
+constexpr double CELLS_A_POINT = 4;    // at most
+constexpr double MOST_TANGENT = 2;     // of a face that is the only one
+constexpr double MOST_PIXELS = 32000;  // along a side
+constexpr std::size_t CELL_BYTES = 24, SAMPLES = 512;
+constexpr int RECENT_BITS = 15;
+constexpr double SQRT3 = 1.7320508075688772;
+constexpr double RAYS_A_VOXEL = 2;  // along each axis: of the rays that end in such a part of a voxel, one is followed
+
+bool isMeasured(const float* p, double near2) {
+  const double x = p[0], y = p[1], z = p[2], square = x * x + y * y + z * z;
+  return square > 0 && square >= near2 && square < INFINITE;
+}
+Vector3d pointAt(const float* p) { return Vector3d(p[0], p[1], p[2]); }
+
+/// A word of its own for each cell of a grid, as far as a map reaches.
+std::uint64_t cellWord(const Vector3d& at) {
+  const auto coordinate = [&](int axis) {
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(at[axis]))) & 0x1fffff;
+  };
+  return coordinate(0) | coordinate(1) << 21 | coordinate(2) << 42;
+}
+
+/// A frame that looks where the points are, on the whole.
+Eigen::Matrix3d frameOf(const SensorView& view, double near2) {
+  const std::size_t count = view.width * view.height, step = std::max<std::size_t>(1, count / SAMPLES);
+  Vector3d ahead = Vector3d::Zero();
+  for (std::size_t i = 0; i < count; i += step) {
+    if (isMeasured(view.xyz + 3 * i, near2)) ahead += pointAt(view.xyz + 3 * i).normalized();
+  }
+  ahead.normalize();
+  Eigen::Index least = 0;
+  ahead.cwiseAbs().minCoeff(&least);
+  const Vector3d right = (Vector3d::Unit(least) - ahead[least] * ahead).normalized();
+  Eigen::Matrix3d frame;
+  frame << right.transpose(), ahead.cross(right).transpose(), ahead.transpose();
+  return frame;
+}
+
+/// Along the axis's two directions.
+Eigen::Matrix3d frameOf(std::size_t face) {
+  const Eigen::Index axis = static_cast<Eigen::Index>(face / 2);
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Zero();
+  frame(0, (axis + 1) % 3) = frame(1, (axis + 2) % 3) = 1;
+  frame(2, axis) = face % 2 == 0 ? 1 : -1;
+  return frame;
+}
+
+}  // namespace
+
+std::size_t CloudRays::memoryBytes() const {
+  std::size_t bytes = followed_.memoryBytes() + recent_.capacity() * sizeof(std::uint64_t);
+  for (const Face& face : faces_) bytes += face.picture.memoryBytes() + 5 * face.points.capacity() * sizeof(float);
+  return bytes;
+}
+
+std::size_t CloudRays::faceOf(const Vector3d& point) const {
+  if (face_count_ == 1) return 0;
+  Eigen::Index axis = 0;
+  point.cwiseAbs().maxCoeff(&axis);
+  return 2 * static_cast<std::size_t>(axis) + (point[axis] < 0 ? 1 : 0);
+}
+
+/// Which directions each face sees, and how far it is to the farthest point. False: these faces are too few.
+bool CloudRays::measure(const SensorView& view, double near2) {
+  for (Face& face : faces_) {
+    face.is_seen = false;
+    face.lo.setConstant(INFINITE);
+    face.hi = -face.lo;
+  }
+  double farthest2 = 0;
+  for (std::size_t i = 0; i < view.width * view.height; ++i) {
+    if (!isMeasured(view.xyz + 3 * i, near2)) continue;
+    const Vector3d point = pointAt(view.xyz + 3 * i);
+    Face& face = faces_[faceOf(point)];
+    const Vector3d at = face.from_sensor * point;
+    const Eigen::Array2d tangents = at.head<2>().array() / at[2];
+    face.lo = face.lo.min(tangents);
+    face.hi = face.hi.max(tangents);
+    face.is_seen = true;
+    if (!(at[2] > 0 && tangents.abs().maxCoeff() <= MOST_TANGENT)) return false;
+    farthest2 = std::max(farthest2, point.squaredNorm());
+  }
+  farthest_m_ = std::sqrt(farthest2);
+  return true;
+}
+
+/// Of each cell the farthest of its points.
+void CloudRays::fill(const SensorView& view, double near2, double focal) {
+  for (Face& face : faces_) {
+    if (!face.is_seen) continue;
+    const Eigen::Array2d last = ((face.hi - face.lo) * focal).round();
+    face.width = static_cast<std::int32_t>(last[0]) + 1;
+    face.height = static_cast<std::int32_t>(last[1]) + 1;
+    const std::size_t size = static_cast<std::size_t>(face.width) * static_cast<std::size_t>(face.height);
+    face.depths = face.picture.depths(static_cast<std::size_t>(face.width), static_cast<std::size_t>(face.height));
+    std::fill_n(face.depths, size, std::numeric_limits<float>::quiet_NaN());
+    face.points.resize(size);
+  }
+  for (std::size_t i = 0; i < view.width * view.height; ++i) {
+    const float* const p = view.xyz + 3 * i;
+    if (!isMeasured(p, near2)) continue;
+    const Vector3d point = pointAt(p);
+    Face& face = faces_[faceOf(point)];
+    const Vector3d at = face.from_sensor * point;
+    const double scale = focal / at[2];
+    const auto pixel = [&](int axis, std::int32_t count) {
+      return std::clamp(static_cast<std::int32_t>(at[axis] * scale - face.lo[axis] * focal + 0.5), 0, count - 1);
+    };
+    const std::size_t cell =
+        static_cast<std::size_t>(pixel(1, face.height)) * face.width + static_cast<std::size_t>(pixel(0, face.width));
+    const float depth = static_cast<float>(at[2]);
+    if (face.depths[cell] >= depth) continue;
+    face.depths[cell] = depth;
+    face.points[cell] = static_cast<std::uint32_t>(i);
+  }
+}
+
+void CloudRays::setWays(const SensorView& view, const Eigen::Matrix3d& from_meters, Face& face) {
+  for (std::vector<float>& ways : face.ways) ways.resize(face.points.size());
+  for (std::size_t cell = 0; cell < face.points.size(); ++cell) {
+    if (!(face.depths[cell] > 0)) continue;
+    const Vector3d point = pointAt(view.xyz + 3 * std::size_t{face.points[cell]});
+    const Vector3d way = from_meters * point / face.from_sensor.row(2).dot(point);
+    for (int axis = 0; axis < 3; ++axis) face.ways[axis][cell] = static_cast<float>(way[axis]);
+  }
+}
+
+/// From there on; lengths in voxels.
+void CloudRays::follow(const SensorView& view, double near2, const Vector3d& sensor, const Eigen::Matrix3d& from_meters,
+                       double from, double to) {
+  recent_.assign(std::size_t{1} << RECENT_BITS, ~std::uint64_t{0});
+  for (std::size_t i = 0; i < view.width * view.height; ++i) {
+    if (!isMeasured(view.xyz + 3 * i, near2)) continue;
+    const Vector3d way = from_meters * pointAt(view.xyz + 3 * i);
+    const double away = way.norm();
+    if (away <= from) continue;
+    const Vector3d start = sensor + way * (from / away), end = sensor + way * std::min(1.0, to / away);
+    if (!(start.minCoeff() >= 0 && start.maxCoeff() < 65536)) continue;  // and so it goes on
+    const std::uint64_t word = cellWord(RAYS_A_VOXEL * end) << 1 | (away > to ? 1u : 0u);
+    std::uint64_t& last = recent_[word * 0x9e3779b97f4a7c15u >> (64 - RECENT_BITS)];
+    if (last != word) followed_.add(start, end);
+    last = word;
+  }
+  followed_.sort();
+}
+
+void CloudRays::read(const SensorView& view, const ViewLimits& limits, std::size_t most_bytes) {
+  const double near2 = limits.near_m * limits.near_m;
+  const Vector3d sensor = limits.voxels(view.map_from_sensor.translation());
+  face_count_ = 1;
+  faces_[0].from_sensor = frameOf(view, near2);
+  if (!measure(view, near2)) {
+    face_count_ = faces_.size();
+    for (std::size_t i = 0; i < face_count_; ++i) faces_[i].from_sensor = frameOf(i);
+    measure(view, near2);
+  }
+  const double of_box = (limits.lo - sensor).cwiseAbs().cwiseMax((limits.hi - sensor).cwiseAbs()).norm();
+  const double clear = std::min(limits.clear_m * limits.voxels_per_m, of_box);
+  // As many cells as the voxels need where they are the smallest, or as there may be.
+  double area = 0, longest = 0;
+  for (const Face& face : faces_) {
+    if (!face.is_seen) continue;
+    area += (face.hi - face.lo).prod();
+    longest = std::max(longest, (face.hi - face.lo).maxCoeff());
+  }
+  const double most_cells = std::min(CELLS_A_POINT * double(view.width * view.height), double(most_bytes / CELL_BYTES));
+  const double needed = CELLS_A_VOXEL * std::min(clear, farthest_m_ * limits.voxels_per_m);
+  const double focal = std::min(needed, std::min(std::sqrt(most_cells / area), MOST_PIXELS / longest));
+  const double pictured = focal < needed ? focal / CELLS_A_VOXEL : clear;
+  const Eigen::Matrix3d from_meters = view.map_from_sensor.linear() * limits.voxels_per_m;
+
+  followed_.clear(most_bytes);
+  fill(view, near2, focal);
+  if (pictured < clear) follow(view, near2, sensor, from_meters, pictured, clear);
+  PictureGeometry geometry;
+  geometry.sensor = sensor;
+  geometry.fx = geometry.fy = focal;
+  geometry.off_px = 0.5;
+  geometry.range = pictured;
+  geometry.resolution_m = limits.resolution_m;
+  sensor_ = sensor;
+  sensor_from_map_ = view.map_from_sensor.linear().transpose();
+  for (Face& face : faces_) {
+    if (!face.is_seen) continue;
+    geometry.camera_from_map = face.from_sensor * view.map_from_sensor.linear().transpose();
+    geometry.cx = -face.lo[0] * focal;
+    geometry.cy = -face.lo[1] * focal;
+    setWays(view, from_meters, face);
+    for (int axis = 0; axis < 3; ++axis) geometry.ways[axis] = face.ways[axis].data();
+    face.picture.build(geometry);
+  }
+}
+
+Seen CloudRays::look(const OctreeCube& cube) {
+  Seen seen = followed_.look(cube);
+  const double half = 0.5 * cube.size(), around = 2 * SQRT3 * half;
+  const Vector3d at = sensor_from_map_ * (Vector3d(cube.x + half, cube.y + half, cube.z + half) - sensor_);
+  for (std::size_t i = 0; i < face_count_; ++i) {
+    Face& face = faces_[i];
+    face.is_asked = false;
+    if (!face.is_seen || seen == Seen::ALL) continue;
+    const Eigen::Index ahead = static_cast<Eigen::Index>(i / 2);
+    const double depth = i % 2 == 0 ? at[ahead] : -at[ahead];
+    if (face_count_ > 1 && std::max(std::abs(at[(ahead + 1) % 3]), std::abs(at[(ahead + 2) % 3])) > depth + around)
+      continue;  // it lies beside of what the face sees
+    const Seen there = face.picture.look(cube);
+    face.is_asked = there == Seen::SOME;
+    seen = std::max(seen, there);
+  }
+  return seen;
+}
+
+bool CloudRays::crosses(const OctreeCube& cube) const {
+  return std::any_of(faces_.begin(), faces_.end(),
+                     [&](const Face& face) { return face.is_asked && face.picture.crosses(cube); });
+}
+
+}  // namespace dccd
