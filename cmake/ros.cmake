@@ -6,7 +6,7 @@ if(OCTOMAP_SOURCES)
   add_library(deformable_ccd_octomap SHARED ${OCTOMAP_SOURCES})
   target_include_directories(deformable_ccd_octomap PUBLIC include PRIVATE src)
   target_include_directories(deformable_ccd_octomap SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
-  target_link_libraries(deformable_ccd_octomap PUBLIC deformable_ccd ${OCTOMAP_LIBRARIES} PRIVATE deformable_ccd_hwy)
+  target_link_libraries(deformable_ccd_octomap PUBLIC deformable_ccd ${OCTOMAP_LIBRARIES})
   list(APPEND ROS_LINK_LIBRARIES deformable_ccd_octomap)
 endif()
 

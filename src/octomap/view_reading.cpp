@@ -9,7 +9,7 @@
 #include "obstacle/radix_sort.h"
 #include "obstacle/voxel_bits.h"
 #include "octomap/camera_fit.h"
-#include "octomap/point_places.h"
+#include "simd/point_places.h"
 
 namespace dccd {
 namespace {
@@ -50,7 +50,7 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
   const double fill2 = std::pow(limits.fill_m * scale, 2), clear = limits.clear_m * scale;
   // What lies further away ends in no voxel that is cleared.
   const double keep2 = view.clears ? std::pow(clear + DIAGONAL, 2) : 0;
-  PlaceLimits grid;
+  simd::PlaceLimits grid;
   for (int axis = 0; axis < 3; ++axis) {
     grid.sensor[axis] = sensor[axis];
     grid.lo[axis] = std::max(limits.lo[axis], 0.0);
@@ -68,10 +68,10 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
   };
   std::int32_t last[3] = {-1, -1, -1};
   bool last_fills = false;
-  PointPlaces places;
+  simd::PointPlaces places;
   const std::size_t all = view.width * view.height;
   for (std::size_t first = 0; first < all; first += places.count) {
-    places.count = std::min(PointPlaces::MOST, view.width - first % view.width);  // of one row
+    places.count = std::min(simd::PointPlaces::MOST, view.width - first % view.width);  // of one row
     takeInto(first, grid, places);
     if (depths) std::copy(places.depth, places.depth + places.count, depths + first);
     for (std::size_t i = 0; i < places.count; ++i) {
@@ -88,7 +88,7 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
       }
       const bool is_far = away2 > fill2, is_in = places.is_in[i] != 0;
       if (!is_in && !is_far) {
-        const Vector3d at = sensor + places.at(i);
+        const Vector3d at = sensor + Vector3d(places.x[i], places.y[i], places.z[i]);
         const bool is_wanted = (at.array() >= limits.lo.array()).all() && (at.array() < limits.hi.array()).all();
         if (is_wanted) checkSpan("a point lies at", at, limits);
       }
@@ -131,9 +131,10 @@ SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, st
     const Pinhole& lens = view.pinhole;
     const Vector3d corner = from_meters * Vector3d(-lens.cx / lens.fx, -lens.cy / lens.fy, 1);
     const Vector3d right = from_meters.col(0) / lens.fx, down = from_meters.col(1) / lens.fy;
-    const auto take = [&](std::size_t first, const PlaceLimits& grid, PointPlaces& places) {
+    const auto take = [&](std::size_t first, const simd::PlaceLimits& grid, simd::PointPlaces& places) {
       const auto v = static_cast<double>(first / view.width), u = static_cast<double>(first % view.width);
-      placeDepths(view.depth_m + first, corner + down * v + right * u, right, grid, places);
+      const Vector3d left = corner + down * v + right * u;
+      simd::placeDepths(view.depth_m + first, left.data(), right.data(), grid, places);
     };
     const auto kindOf = [&](std::size_t i) {
       const float z = view.depth_m[i];
@@ -142,8 +143,8 @@ SeenCounts ViewReader::read(const SensorView& view, const ViewLimits& limits, st
     readPoints(view, limits, depths, take, kindOf, counts);
   } else {
     const Vector3d ahead = camera ? Vector3d(camera->camera_from_sensor.row(2)) : Vector3d(0, 0, 0);
-    const auto take = [&](std::size_t first, const PlaceLimits& grid, PointPlaces& places) {
-      placePoints(view.xyz + 3 * first, from_meters, ahead, grid, places);
+    const auto take = [&](std::size_t first, const simd::PlaceLimits& grid, simd::PointPlaces& places) {
+      simd::placePoints(view.xyz + 3 * first, from_meters.data(), ahead.data(), grid, places);
     };
     const auto kindOf = [&](std::size_t i) {
       const float *p = view.xyz + 3 * i, x = p[0], y = p[1], z = p[2];

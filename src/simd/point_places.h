@@ -5,9 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <Eigen/Core>
+#include "dccd/export.h"
 
 namespace dccd {
+namespace simd {
 
 /// Places relative to the sensor, along the map's axes [voxels]; zeros for what is no point.
 struct PointPlaces {
@@ -20,8 +21,6 @@ struct PointPlaces {
   /// 1: as the one before it lies in the limits, further away than nothing, at the least the nearest and at the most
   /// the farthest, and in the same voxel. Else 0.
   std::int32_t repeats[MOST];
-
-  Eigen::Vector3d at(std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
 /// [voxels] From the corner of the voxel whose key is 0. The limits are within 0 and 65536; hi is exclusive.
@@ -31,10 +30,11 @@ struct PlaceLimits {
 };
 
 /// Of `places.count` pixels of a row of depths [m]: a pixel of depth 1 m lies at `first`, each next one `right` of it.
-void placeDepths(const float* depth_m, const Eigen::Vector3d& first, const Eigen::Vector3d& right,
-                 const PlaceLimits& limits, PointPlaces& places);
-/// Of `places.count` points, three coordinates each. depth: along `ahead`.
-void placePoints(const float* xyz, const Eigen::Matrix3d& from_sensor, const Eigen::Vector3d& ahead,
-                 const PlaceLimits& limits, PointPlaces& places);
+DCCD_EXPORT void placeDepths(const float* depth_m, const double* first, const double* right, const PlaceLimits& limits,
+                             PointPlaces& places);
+/// Of `places.count` points, three coordinates each, by a matrix, column by column. depth: along `ahead`.
+DCCD_EXPORT void placePoints(const float* xyz, const double* from_sensor, const double* ahead,
+                             const PlaceLimits& limits, PointPlaces& places);
 
+}  // namespace simd
 }  // namespace dccd

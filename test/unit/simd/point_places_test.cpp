@@ -1,4 +1,4 @@
-#include "octomap/point_places.h"
+#include "simd/point_places.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,12 @@
 #include <random>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "support/simd_targets.h"
 
 namespace dccd {
+namespace simd {
 namespace {
 
 constexpr float INFINITE = std::numeric_limits<float>::infinity(), NOTHING = std::numeric_limits<float>::quiet_NaN();
@@ -39,7 +42,7 @@ bool expectPlaces(const PointPlaces& places, const std::vector<Place>& expected,
       is_in = is_in && at >= GRID.lo[axis] && at < GRID.hi[axis];
       keys[axis] = static_cast<std::int32_t>(std::floor(std::fmin(std::fmax(at, 0), 65535)));
     }
-    EXPECT_EQ(places.at(i), p) << target << ' ' << i;
+    EXPECT_EQ(Eigen::Vector3d(places.x[i], places.y[i], places.z[i]), p) << target << ' ' << i;
     EXPECT_EQ(places.away2[i], p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) << target << ' ' << i;
     EXPECT_EQ(places.depth[i], expected[i].depth) << target << ' ' << i;
     EXPECT_EQ(places.is_in[i], is_in ? 1 : 0) << target << ' ' << i << ": " << p.transpose();
@@ -89,7 +92,7 @@ TEST(PointPlaces, OfDepthsAreThoseOfPlainNumbersOnEachTarget) {
     test::forEachTarget([&](const std::string& target) {
       const auto places = std::make_unique<PointPlaces>();
       places->count = count;
-      placeDepths(depths.data(), first, right, GRID, *places);
+      placeDepths(depths.data(), first.data(), right.data(), GRID, *places);
       EXPECT_EQ(expectPlaces(*places, expected, target), count > 100) << target;
     });
   }
@@ -115,11 +118,12 @@ TEST(PointPlaces, OfPointsAreThoseOfPlainNumbersOnEachTarget) {
     test::forEachTarget([&](const std::string& target) {
       const auto places = std::make_unique<PointPlaces>();
       places->count = count;
-      placePoints(xyz.data(), m, ahead, GRID, *places);
+      placePoints(xyz.data(), m.data(), ahead.data(), GRID, *places);
       EXPECT_EQ(expectPlaces(*places, expected, target), count > 100) << target;
     });
   }
 }
 
 }  // namespace
+}  // namespace simd
 }  // namespace dccd

@@ -1,15 +1,16 @@
-#include "octomap/point_places.h"
+#include "simd/point_places.h"
 
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "octomap/point_places.cpp"
+#define HWY_TARGET_INCLUDE "simd/point_places.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 // Plain loops: the compiler makes vectors of them for each target.
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
+namespace simd {
 namespace HWY_NAMESPACE {
 
 void locateAxis(const double* HWY_RESTRICT place, size_t count, double sensor, double lo, double hi,
@@ -88,24 +89,27 @@ void PlacePoints(const float* HWY_RESTRICT xyz, const double* HWY_RESTRICT m, co
 }
 
 }  // namespace HWY_NAMESPACE
+}  // namespace simd
 }  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace dccd {
+namespace simd {
 
 HWY_EXPORT(PlaceDepths);
 HWY_EXPORT(PlacePoints);
 
-void placeDepths(const float* depth_m, const Eigen::Vector3d& first, const Eigen::Vector3d& right,
-                 const PlaceLimits& limits, PointPlaces& places) {
-  HWY_DYNAMIC_DISPATCH(PlaceDepths)(depth_m, first.data(), right.data(), limits, places);
+void placeDepths(const float* depth_m, const double* first, const double* right, const PlaceLimits& limits,
+                 PointPlaces& places) {
+  HWY_DYNAMIC_DISPATCH(PlaceDepths)(depth_m, first, right, limits, places);
 }
 
-void placePoints(const float* xyz, const Eigen::Matrix3d& from_sensor, const Eigen::Vector3d& ahead,
-                 const PlaceLimits& limits, PointPlaces& places) {
-  HWY_DYNAMIC_DISPATCH(PlacePoints)(xyz, from_sensor.data(), ahead.data(), limits, places);
+void placePoints(const float* xyz, const double* from_sensor, const double* ahead, const PlaceLimits& limits,
+                 PointPlaces& places) {
+  HWY_DYNAMIC_DISPATCH(PlacePoints)(xyz, from_sensor, ahead, limits, places);
 }
 
+}  // namespace simd
 }  // namespace dccd
 #endif
