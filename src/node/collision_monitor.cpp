@@ -89,7 +89,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
-  frames_handed_over += message.object.type != nullptr;
+  frames_handed_over += message.object.handed_over;
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
   // voxels are followed by where the bodies were.
   if (!enabled && !pipeline.isStatic(body) && !config.ownsVoxels()) {
@@ -151,8 +151,10 @@ void CollisionMonitor::Impl::subscribe() {
   mesh_subscriptions.resize(config.bodies.size());
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (config.bodies[b].isRigid()) continue;
+    const BodyConfig& body = config.bodies[b];
     mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
-        input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
+        input, body.topic, owns_process ? nullptr : findMeshTypeNamed(body.input.type),
+        [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
   const auto listenTo = [&](const std::string& topic, bool is_static) {
     ros::SubscribeOptions options;
@@ -230,16 +232,15 @@ void CollisionMonitor::Impl::endInTime() {
   }).detach();
 }
 
-CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node, Process process,
                                    const std::function<bool()>& goes_on)
     // The early state lives until the whole is made: its topics stay.
     : impl_(
           std::make_unique<Impl>(node, private_node, configOf(node, private_node, goes_on, EarlyState(private_node)))) {
+  impl_->owns_process = process == Process::OWN;
   impl_->start();
 }
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
-
-void CollisionMonitor::takeProcess() { impl_->owns_process = true; }
 
 }  // namespace dccd

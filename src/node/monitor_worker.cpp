@@ -117,12 +117,12 @@ std::vector<AwaitedTopic> CollisionMonitor::Impl::silentTopics() {
     if (frames > 0 && (pipeline.isStatic(b) || secondsBetween(heard[b].at_ns, now_ns) < patience_s)) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
                       config.bodies_listed ? "bodies/" + config.bodies[b].body.name + "/topic" : "mesh:=TOPIC",
-                      frames > 0, ""});
+                      frames > 0});
   }
   const bool may_rest = pipeline.effects().mapSeen() && config.monitor.octomap_timeout_s == 0;
   for (const ros::Subscriber& map : map_subscribers) {
     if (!pipeline.effects().mapExpected() || may_rest) continue;
-    silent.push_back({map.getTopic(), map.getNumPublishers(), "", map_publisher_seen, ""});
+    silent.push_back({map.getTopic(), map.getNumPublishers(), "", map_publisher_seen});
   }
   return silent;
 }

@@ -93,7 +93,7 @@ class StateTest(LiveNodeTest):
         stream.end()
         last = 100 + stream.cloud.count / stream.rate
         self.wait_missing('no frame has come')
-        self.wait_reason('/silent/mesh has fallen silent, though its publisher lives (see rostopic hz)')
+        self.wait_reason('/silent/mesh has fallen silent (see rostopic hz and rosnode ping)')
         late = self.late_subscriber('silent')
         self.assertFalse(late.proved)
         self.assertAlmostEqual(late.holds_until.to_sec(), last, 6)

@@ -13,6 +13,7 @@
 
 #include "deformable_ccd/MeshStamped.h"
 #include "input/mesh_decoder.h"
+#include "ros/support/bytes_of.h"
 #include "ros/support/meshes.h"
 #include "support/said.h"
 
@@ -33,7 +34,7 @@ class MessageGrammar : public ::testing::Test {
   template <typename Message>
   DecodedMesh read(const Message& message) {
     const MeshType& type = *findMeshType(ros::message_traits::datatype(message));
-    const std::vector<std::uint8_t> bytes = type.serialize(&message);
+    const std::vector<std::uint8_t> bytes = test::bytesOf(message);
     if (!decoder_) {
       decoder_.emplace(config);
       of_objects_.emplace(config);
