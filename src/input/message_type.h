@@ -132,7 +132,8 @@ MeshType meshType(const char* name) {
   row.size = [](const void* message) -> std::size_t {
     return ros::serialization::serializationLength(*static_cast<const Message*>(message));
   };
-  row.receiver = [](const MeshType& type, const MessageCount& lost, const std::function<void(const TypedMesh&)>& callback) {
+  row.receiver = [](const MeshType& type, const MessageCount& lost,
+                    const std::function<void(const TypedMesh&)>& callback) {
     return ros::SubscriptionCallbackHelperPtr(boost::make_shared<ObjectReceiver<Message>>(type, lost, callback));
   };
   return row;

@@ -6,7 +6,6 @@
 #include <std_msgs/Bool.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "dccd/simd_target.h"
 #include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "node/robot_source.h"
@@ -50,11 +49,9 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
   MonitorConfig config =
       readConfig(tree, "~", robotOfParameters(node, goes_on, [&](const std::string& what) { early.say(what); }));
   for (const std::string& sentence : config.robot.missing) ROS_WARN_STREAM(sentence);
-  for (const std::string& sentence : config.robot.remarks) ROS_WARN_STREAM("robot: " << sentence);
+  for (const std::string& sentence : config.robot.hints) ROS_WARN_STREAM("robot: " << sentence);
   takeRemappings(node, config);
   limitLive(config);
-  // It is the process's: another nodelet may have named one, and its worker may be at it.
-  if (config.simd_target != "auto") setSimdTarget(config.simd_target);
   return config;
 }
 
@@ -106,7 +103,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
   const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(*event.getConstMessage()));
   if (message) feed.add(*message, is_static, event.getPublisherName());
-  for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
+  for (const std::string& line : feed.takeProblems()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
   feed.lose(is_static);
   tellLost(is_static ? "/tf_static" : "/tf", error);
