@@ -19,7 +19,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "support/data.h"
 #include "support/detector.h"

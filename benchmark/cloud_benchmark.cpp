@@ -10,8 +10,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "dccd/cloud_map.h"
-#include "dccd/next_surface.h"
+#include "base/cloud_map.h"
+#include "base/next_surface.h"
 #include "support/seen_scene.h"
 #include "support/timing.h"
 

@@ -10,9 +10,9 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "apps/make_scene_bag/physics/scene_file.h"
-#include "apps/make_scene_bag/physics/shapes.h"
-#include "apps/make_scene_bag/physics/simulation.h"
+#include "scenes/physics/scene_file.h"
+#include "scenes/physics/shapes.h"
+#include "scenes/physics/simulation.h"
 #include "simd/group_pairs.h"
 #include "support/data.h"
 #include "support/detector.h"

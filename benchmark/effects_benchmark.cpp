@@ -6,10 +6,10 @@
 #include <fstream>
 #include <iostream>
 
-#include "apps/make_scene_bag/physics/scene_file.h"
-#include "apps/make_scene_bag/physics/simulation.h"
-#include "dccd/effect_plan.h"
+#include "base/effect_plan.h"
 #include "dccd/stream.h"
+#include "scenes/physics/scene_file.h"
+#include "scenes/physics/simulation.h"
 #include "support/data.h"
 #include "support/detector.h"
 #include "support/scene_data.h"

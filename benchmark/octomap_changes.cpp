@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-#include "dccd/next_surface.h"
+#include "base/next_surface.h"
 #include "dccd/stream.h"
 #include "obstacle/voxel_bits.h"
 #include "support/octomap_cases.h"

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "apps/decimal_options.h"
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "dccd/elementary.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 #include "support/closed_loop.h"
 
 namespace dccd {

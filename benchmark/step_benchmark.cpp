@@ -13,7 +13,7 @@
 #include <stdexcept>
 
 #include "dccd/detect.h"
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 #include "paper/known_contacts.h"
 #include "support/data.h"
 #include "support/scene_data.h"

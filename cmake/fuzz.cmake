@@ -9,7 +9,7 @@ file(GLOB DECODER_FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/decoders/*_fuzz.cpp)
 # list is whole. Objects, not an archive: a message type registers itself, and nothing else asks for its file.
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 set(DECODER_SOURCES ${MESSAGE_TYPES}
-  src/apps/make_scene_bag/physics/scene_file.cpp src/apps/make_scene_bag/physics/shapes.cpp
+  scenes/physics/scene_file.cpp scenes/physics/shapes.cpp
   src/config/parameter_reader.cpp src/config/parameter_yaml.cpp src/input/dae_file.cpp src/input/depth_surface.cpp
   src/input/known_types.cpp src/input/marker_names.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp
   src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_layout.cpp src/input/message_type.cpp
@@ -24,7 +24,7 @@ if(NOT DEFORMABLE_CCD_FUZZ)
   endif()
   add_library(deformable_ccd_decoders OBJECT EXCLUDE_FROM_ALL ${DECODER_SOURCES})
   add_dependencies(deformable_ccd_decoders ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
-  target_include_directories(deformable_ccd_decoders PUBLIC src)
+  target_include_directories(deformable_ccd_decoders PUBLIC src ${CMAKE_CURRENT_SOURCE_DIR})
   target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
   target_compile_options(deformable_ccd_decoders PRIVATE ${COLD_CODE})
   set_target_properties(deformable_ccd_decoders PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
@@ -55,7 +55,7 @@ endforeach()
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
 add_library(deformable_ccd_decoders OBJECT ${DECODER_SOURCES})
-target_include_directories(deformable_ccd_decoders PUBLIC src)
+target_include_directories(deformable_ccd_decoders PUBLIC src ${CMAKE_CURRENT_SOURCE_DIR})
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
   deformable_ccd_archive yaml-cpp ${TINYXML2_LIBRARY} ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${LZ4_LIBRARY})

@@ -1,7 +1,7 @@
-# The physics that records scenes (src/apps/make_scene_bag/physics: Bullet soft bodies in double precision, never part of the node).
+# The physics that records scenes (scenes/physics: Bullet soft bodies in double precision, never part of the node).
 # The one strict reader of configuration: of scene files here, of the node's parameters in ros.cmake.
 file(GLOB PARAMETERS_SOURCES CONFIGURE_DEPENDS src/config/parameter_*.cpp)
-file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/apps/make_scene_bag/physics/*.cpp)
+file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS scenes/physics/*.cpp)
 if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURCES)
   # Two builds of Bullet can be installed side by side; single precision would make the recorded cloth jitter.
   #catkin_lint: ignore_once duplicate_find
@@ -22,7 +22,7 @@ if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURC
   endif()
   if(BULLET_DOUBLE_FOUND)
     add_library(deformable_ccd_physics STATIC ${PHYSICS_SOURCES})
-    target_include_directories(deformable_ccd_physics PUBLIC src)
+    target_include_directories(deformable_ccd_physics PUBLIC src ${CMAKE_CURRENT_SOURCE_DIR})
     target_compile_options(deformable_ccd_physics PRIVATE ${COLD_CODE})
     set_target_properties(deformable_ccd_physics PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
     # Bullet's headers raise warnings of their own under -Wextra.

@@ -10,7 +10,7 @@ find_package(nlohmann_json ${TOOLS_NEED})
 # The exact oracle: judges the rungs in the tests and the benchmarks. The libraries and tools never link it.
 file(GLOB ORACLE_SOURCES CONFIGURE_DEPENDS oracle/*.cpp)
 add_library(deformable_ccd_oracle STATIC EXCLUDE_FROM_ALL ${ORACLE_SOURCES})
-target_include_directories(deformable_ccd_oracle PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+target_include_directories(deformable_ccd_oracle PUBLIC ${CMAKE_CURRENT_SOURCE_DIR} PRIVATE src)  # base, of which query files take a header
 target_link_libraries(deformable_ccd_oracle PUBLIC deformable_ccd_headers ${GMP_LIBRARY})
 
 # The report of a run: JSON, CSV, and a page whose markup, style and scripts are files of their own kind. Its player

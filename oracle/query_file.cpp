@@ -11,7 +11,7 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "dccd/regular_file.h"
+#include "base/regular_file.h"
 
 namespace dccd {
 namespace {

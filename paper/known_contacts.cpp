@@ -6,8 +6,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "dccd/decimal.h"
-#include "dccd/regular_file.h"
+#include "base/decimal.h"
+#include "base/regular_file.h"
 
 namespace dccd {
 namespace {

@@ -57,14 +57,6 @@ std::string choiceOf(py::handle value, const std::string& name) {
   return value.cast<std::string>();
 }
 
-void setBroadPhase(Options& options, py::handle value, const Bodies&) {
-  const std::string choice = choiceOf(value, "broad_phase");
-  if (choice != "clustered" && choice != "brute_force") {
-    throw py::value_error("broad_phase: \"" + choice + "\" is none of clustered, brute_force");
-  }
-  options.broad_phase = choice == "clustered" ? BroadPhase::CLUSTERED : BroadPhase::BRUTE_FORCE;
-}
-
 void setExcludeBoxes(Options& options, py::handle value, const Bodies&) {
   const Doubles boxes = doublesOf(value, "exclude_boxes", {ANY, 2, 3});
   options.exclude_boxes.assign(static_cast<std::size_t>(boxes.shape(0)), Box());
@@ -167,10 +159,6 @@ const std::vector<Row>& rows() {
       DCCD_ACCURACY(tolerance_m),
       DCCD_ACCURACY(toc_bits),
       DCCD_ACCURACY(max_subdivisions),
-      {"broad_phase", setBroadPhase,
-       [](const Options& o, const Bodies&) {
-         return py::object(py::str(o.broad_phase == BroadPhase::CLUSTERED ? "clustered" : "brute_force"));
-       }},
       DCCD_PLAIN(num_threads),
       DCCD_PLAIN(step_budget_ms),
       DCCD_PLAIN(max_compute_ms),

@@ -5,8 +5,8 @@
 #include <functional>
 #include <string_view>
 
+#include "base/contact_fields.h"
 #include "dccd/assurance.h"
-#include "dccd/contact_fields.h"
 #include "module.h"
 
 namespace dccd {

@@ -8,23 +8,18 @@
 
 #include "dccd/assurance.h"
 #include "dccd/clearance.h"
-#include "dccd/deadline.h"
 #include "dccd/elementary.h"
-#include "dccd/expectation.h"
 #include "dccd/export.h"
 #include "dccd/outcome.h"
 #include "dccd/step.h"
 #include "dccd/tolerances.h"
+#include "dccd/types.h"
 
 namespace dccd {
-
-/// The paper's own hierarchy is not among them: it serves benchmarks and tests (paper/).
-enum class BroadPhase : std::uint8_t { CLUSTERED = 0, BRUTE_FORCE = 1 };
 
 /// How a step is answered.
 struct Options {
   AccuracyOptions accuracy;
-  BroadPhase broad_phase = BroadPhase::CLUSTERED;
   int num_threads = 1;            ///< 1 or more
   double step_budget_ms = 0;      ///< 0: none
   double max_compute_ms = 0;      ///< ends a step that has no budget as if it were one; 0: none
@@ -78,7 +73,6 @@ class DCCD_EXPORT History {
   const std::vector<LeftOutPair>& leftOut() const;
 
   struct DCCD_HIDDEN Impl;
-  Impl& impl() { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;

@@ -8,7 +8,6 @@
 #include <iterator>
 #include <memory>
 
-#include "dccd/deadline.h"
 #include "dccd/export.h"
 #include "dccd/tolerances.h"
 #include "dccd/types.h"

@@ -32,7 +32,7 @@ struct Patch {
   std::array<std::uint16_t, 2> body{0, 0};  ///< ascending; equal: with itself; [1] may be OBSTACLE_BODY
   std::size_t contacts = 0, certain = 0, initial = 0;
   std::size_t crossings = 0;
-  std::size_t expected = 0;  ///< of its contacts and crossings, those that are expected (dccd/expectation.h)
+  std::size_t expected = 0;  ///< of its contacts and crossings, those that are expected (dccd/step.h)
   /// [0,1] of the step: the first touch of any of its contacts is in between, if any of them is certain. 0 and 0 where
   /// surfaces cross already.
   double toc_lower = 1, toc_upper = 1;

@@ -143,7 +143,6 @@ class DCCD_EXPORT Monitor {
   void setListener(StepListener* listener);
 
   struct DCCD_HIDDEN Impl;
-  Impl& impl() { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "dccd/contact.h"
-#include "dccd/deadline.h"
 #include "dccd/export.h"
 #include "dccd/topology.h"
 #include "dccd/types.h"
@@ -42,7 +41,6 @@ class DCCD_EXPORT VoxelSurface {
   const std::vector<OccupiedLeaf>& leaves() const;
   /// The leaf that contains the point (closed), or null. Ties on shared planes: the smallest key.
   const OccupiedLeaf* leafAt(const Vec3& point_map) const;
-  const Impl& impl() const { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;

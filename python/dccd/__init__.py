@@ -121,8 +121,8 @@ def detect(bodies: Body | Sequence[Body], *, voxels: Voxels | None = None, histo
         In so many parts at most. 64.
     excluded : list of str
         Sentences for Outcome.excluded: what you left out before.
-    keep_bounds, unfolded_test, broad_phase
-        For measurements; no answer changes. True, True, 'clustered' or 'brute_force'.
+    keep_bounds, unfolded_test
+        For measurements; no answer changes. True, True.
 
     Returns
     -------

@@ -11,7 +11,7 @@
 #include "apps/analyze_bag/result_bag.h"
 #include "apps/analyze_bag/study_runner.h"
 #include "apps/decimal_options.h"
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 #include "node/bag_replay.h"
 #include "node/robot_source.h"
 #include "report/report.h"
@@ -149,7 +149,7 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
       {"threads", std::to_string(config.monitor.detector.num_threads)},
       {"SIMD target", simdTarget()}};
   for (const std::string& sentence : summary.not_looked_at) facts.push_back({"not looked at", sentence});
-  for (const std::string& c : summary.complaints) facts.push_back({"complaint", c});
+  for (const std::string& c : summary.problems) facts.push_back({"complaint", c});
   report.setNotLookedAt(summary.not_looked_at);
   report.setFacts(std::move(facts));
 }
@@ -168,7 +168,7 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
   for (const std::string& sentence : summary.not_looked_at) std::cout << "note: " << sentence << '\n';
   const std::string unproved = report.unproved();
   const std::string said = std::accumulate(summary.not_looked_at.begin(), summary.not_looked_at.end(), unproved);
-  for (const std::string& c : summary.complaints) {
+  for (const std::string& c : summary.problems) {
     const std::string refused = "refused: ";
     const std::size_t at = c.find(refused);
     const std::string reason = at == std::string::npos ? c : c.substr(at + refused.size());
@@ -182,7 +182,6 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
 int analyze(const Arguments& a) {
   for (const std::string& input : {a.bag, a.params, a.octomap, a.robot}) refuseToOverwrite(input, {a.out});
   const MonitorConfig config = configure(a);
-  setSimdTarget(config.simd_target);
   BagReplayOptions options;
   options.octomap_file = a.octomap;
   options.show_progress = !a.quiet;

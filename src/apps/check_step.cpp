@@ -15,7 +15,7 @@
 
 #include "apps/decimal_options.h"
 #include "dccd/detect.h"
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 #include "input/mesh_formats.h"
 #include "report/progress_bar.h"
 #include "stream/quantile.h"
@@ -185,7 +185,7 @@ void print(const Arguments& a, const Run& run) {
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
 
-void remark(const std::string& path, const std::string& text) {
+void hint(const std::string& path, const std::string& text) {
   std::cerr << "check_step: " << path << ": " << text << '\n';
 }
 
@@ -248,12 +248,12 @@ std::vector<MeshFile> framesOf(const std::vector<std::string>& paths) {
     }
   }
   if (const std::size_t apart = frames[0].is_soup ? matchSoups(frames) : 0; apart > 0) {
-    remark(paths[0], std::to_string(apart) +
-                         " vertices come apart in a later frame: their corners are vertices of their own, which touch "
-                         "where they are equal; write OBJ or PLY if they are to be one");
+    hint(paths[0], std::to_string(apart) +
+                       " vertices come apart in a later frame: their corners are vertices of their own, which touch "
+                       "where they are equal; write OBJ or PLY if they are to be one");
   }
   for (std::size_t i = 0; i < paths.size(); ++i) {
-    for (const std::string& text : frames[i].remarks) remark(paths[i], text);
+    for (const std::string& text : frames[i].hints) hint(paths[i], text);
   }
   return frames;
 }

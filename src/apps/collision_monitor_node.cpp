@@ -25,8 +25,8 @@ int main(int argc, char** argv) {
   }
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
-    dccd::CollisionMonitor monitor{node, ros::NodeHandle("~"), [] { return ros::ok() && !ended; }};
-    monitor.takeProcess();
+    const auto goes_on = [] { return ros::ok() && !ended; };
+    const dccd::CollisionMonitor monitor{node, ros::NodeHandle("~"), dccd::CollisionMonitor::Process::OWN, goes_on};
     while (ros::ok() && !ended) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
   } catch (const dccd::ParameterError& error) {
     ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what()

@@ -10,8 +10,8 @@
 #include <system_error>
 #include <vector>
 
+#include "base/decimal.h"
 #include "config/nearest_name.h"
-#include "dccd/decimal.h"
 
 namespace dccd {
 

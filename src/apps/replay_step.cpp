@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "apps/decimal_options.h"
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 #include "record/explain.h"
 #include "record/step_replay.h"
 

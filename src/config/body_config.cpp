@@ -98,14 +98,13 @@ void readUncertainty(ParameterReader section, BodyConfig& body) {
 }
 
 void readSource(ParameterReader& reader, const std::string& default_topic, BodyConfig& body) {
+  refuseGone(reader, "bodies/");
   body.topic_named = reader.has("topic");
   body.topic = reader.get("topic", default_topic);
   std::vector<std::string> types{"auto"};
   for (const MeshType& type : meshTypes()) types.push_back(type.name);
   body.input.type = reader.choice("type", "auto", types);
   body.input.frame_id = reader.frame("frame_id");
-  body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
-  body.input.max_vertices = reader.integer("max_vertices", body.input.max_vertices, 1, MANY);
   readTopology(reader.section("topology"), body);
   if (reader.has("marker")) {
     ParameterReader marker = reader.section("marker");

@@ -21,6 +21,9 @@ Enum choiceOf(ParameterReader& reader, const std::string& name, Enum fallback,
   return static_cast<Enum>(std::find(choices.begin(), choices.end(), word) - choices.begin());
 }
 
+/// Refuses what once was a parameter of this section ("markers/"; "": of the root; "bodies/": of a body), and says what
+/// to write instead.
+void refuseGone(ParameterReader& reader, const std::string& section);
 /// The map's parameters.
 void readMap(ParameterReader& reader, MonitorConfig& config);
 /// Refuses own voxels beside an unknown space that is occupied. After the effects.

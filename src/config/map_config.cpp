@@ -12,10 +12,9 @@ namespace {
 constexpr std::size_t MOST_CLOUD_TOPICS = 16;
 
 void readSensorModel(ParameterReader section, CloudMapOptions& map) {
+  refuseGone(section, "sensor_model/");
   map.hit = section.number("hit", map.hit, 0.5, 0.9999);
   map.miss = section.number("miss", map.miss, 0.0001, 0.5);
-  map.min = section.number("min", map.min, 0.0001, 0.5);
-  map.max = section.number("max", map.max, 0.5, 0.9999);
   section.finish();
 }
 
@@ -33,11 +32,9 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
   const char* const name = "obstacle_cloud_topics";
   const std::vector<ParameterTree> items = reader.list("obstacle_cloud_topics");
   if (items.empty()) return;
-  for (const char* single : {"obstacle_cloud_topic", "obstacle_camera_info_topic", "obstacle_sensor_frame"}) {
-    if (reader.has(single)) {
-      reader.fail(single, std::string("has no place beside ") + name +
-                              "; write {topic: …, camera_info: …, sensor_frame: …} there, and remove it");
-    }
+  if (reader.has("obstacle_cloud_topic")) {
+    reader.fail("obstacle_cloud_topic", std::string("has no place beside ") + name +
+                                            "; write {topic: …, camera_info: …, sensor_frame: …} there, and remove it");
   }
   config.clouds.clear();
   std::set<std::string> topics;
@@ -60,16 +57,14 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
 
 void readClouds(ParameterReader& reader, MonitorConfig& config) {
   // What is said of clouds is said by somebody who has them.
-  for (const char* name : {"obstacle_cloud_topic", "obstacle_cloud_topics", "obstacle_camera_info_topic",
-                           "obstacle_sensor_frame", "obstacle_resolution_m", "obstacle_min_range_m",
-                           "obstacle_max_range_m", "obstacle_no_return", "obstacle_box", "sensor_model"}) {
+  for (const char* name :
+       {"obstacle_cloud_topic", "obstacle_cloud_topics", "obstacle_resolution_m", "obstacle_min_range_m",
+        "obstacle_max_range_m", "obstacle_no_return", "obstacle_box", "sensor_model"}) {
     config.cloud_named = config.cloud_named || reader.has(name);
   }
   CloudSource& single = config.clouds.front();
   single.topic = reader.get("obstacle_cloud_topic", single.topic);
   if (single.topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
-  single.camera_info = reader.get("obstacle_camera_info_topic", std::string());
-  single.sensor_frame = reader.frame("obstacle_sensor_frame");
   readCloudTopics(reader, config);
   CloudMapOptions& map = config.cloud_map;
   map.resolution_m = reader.number("obstacle_resolution_m", map.resolution_m, 1e-4, 1e3);

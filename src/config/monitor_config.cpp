@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 
+#include "base/accuracy.h"
 #include "config/body_config.h"
-#include "dccd/accuracy.h"
 
 namespace dccd {
 
@@ -13,6 +14,34 @@ using XmlRpc::XmlRpcValue;
 using Kind = ParameterTree::Kind;
 
 namespace {
+
+/// What a live node's step may take without a budget of its own.
+constexpr double MAX_COMPUTE_MS = 500;
+
+/// What once was a parameter, and what to write instead. Those of a body are below bodies/.
+constexpr std::pair<const char*, const char*> GONE[] = {
+    {"earliest_only", "a monitor looks for all contacts; remove it, or ask the library or Python for the first alone"},
+    {"tolerance_m", "it is 1e-6 m, as for whoever did not write it; remove it"},
+    {"toc_bits", "a time of contact is known to 2^-32 of a step; remove it"},
+    {"max_subdivisions", "what 4096 subdivisions do not decide is undecided; remove it"},
+    {"max_substeps", "a turn is cut into at most 64 parts; remove it, or raise rigid_tolerance_m"},
+    {"simd_target", "no answer depends on it, and the best one is taken; remove it"},
+    {"max_compute_s", "write step_budget_ms, in milliseconds; without it a step of a live node ends after 500"},
+    {"initial_contacts", "contacts are listed all; own_voxels_m takes a body's own voxels out of the map"},
+    {"obstacle_camera_info_topic", "write obstacle_cloud_topics: [{topic: …, camera_info: …}]"},
+    {"obstacle_sensor_frame", "write obstacle_cloud_topics: [{topic: …, sensor_frame: …}]"},
+    {"sensor_model/min", "no voxel is less probable than 0.12, as in octomap_server; remove it"},
+    {"sensor_model/max", "no voxel is more probable than 0.97, as in octomap_server; remove it"},
+    {"markers/normal_length_m", "a normal is five points long; write markers/point_size_m"},
+    {"markers/line_width_m", "a line is a fifth of a point wide; write markers/point_size_m"},
+    {"markers/max_contacts", "the first 2000 are shown, as RViz can hold them; remove it"},
+    {"markers/swept", "markers/mesh shows bodies and their padding; remove it"},
+    {"clearance/tolerance_m", "distances are known to 1e-4 m; remove it, or ask the library or Python"},
+    {"record_folder", "steps are recorded to deformable_ccd in $ROS_HOME; set ROS_HOME of the node"},
+    {"robot/scale", "scale single links by robot/links, or widen all of them by robot/padding_m"},
+    {"bodies/weld", "corners of triangles that coincide are one vertex; remove it"},
+    {"bodies/max_vertices", "a mesh has at most 1000000 vertices; remove it"},
+};
 
 Accuracy readRung(ParameterReader& reader) {
   std::vector<std::string> names;
@@ -23,9 +52,6 @@ Accuracy readRung(ParameterReader& reader) {
 void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
   Options& detector = config.monitor.detector;
   detector.accuracy.rung = readRung(reader);
-  detector.accuracy.tolerance_m = reader.number("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
-  detector.accuracy.toc_bits = reader.integer("toc_bits", detector.accuracy.toc_bits, 10, 52);
-  detector.accuracy.max_subdivisions = reader.integer("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
   detector.num_threads = reader.integer("num_threads", detector.num_threads, 1, 256);
   detector.step_budget_ms = reader.number("step_budget_ms", 0.0, 0, LARGE);
   config.minimum_separation_m = separationOf(reader, 0.0);
@@ -71,12 +97,6 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.patch_gap_s = reader.number("patch_gap_s", monitor.patch_gap_s, 0, LARGE);
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
   monitor.detector.max_contacts = reader.integer("max_contacts", monitor.detector.max_contacts, 1, MANY);
-  monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
-  if (reader.has("earliest_only")) {
-    reader.fail(
-        "earliest_only",
-        "is gone: a monitor looks for all contacts; remove it, or ask the library or Python for the first alone");
-  }
   for (const ParameterTree& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);
     const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
@@ -86,15 +106,12 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   }
   monitor.detector.rigid_tolerance_m =
       reader.number("rigid_tolerance_m", monitor.detector.rigid_tolerance_m, 1e-9, LARGE);
-  monitor.detector.max_substeps = reader.integer("max_substeps", monitor.detector.max_substeps, 1, 100000);
   monitor.look_ahead_s = reader.number("look_ahead_s", monitor.look_ahead_s, 0, 3600);
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.answer_timeout_s = reader.number("answer_timeout_s", config.answer_timeout_s, 1e-3, LARGE);
   config.queue_size = reader.integer("queue_size", config.queue_size, 1, 100000);
   config.queue_policy = choiceOf(reader, "queue_policy", QueuePolicy::NEWEST, {"newest", "oldest", "thin"});
-  config.simd_target = reader.get("simd_target", config.simd_target);
   config.record_steps = reader.integer("record_steps", config.record_steps, 0, 10000);
-  config.record_folder = reader.get("record_folder", std::string());
 }
 
 /// A quarter for what waits in queues, a quarter for what a step finds, half for frames as they are used.
@@ -108,14 +125,10 @@ void limitMemory(MonitorConfig& config) {
   for (BodyConfig& body : config.bodies) body.input.max_faces = 2 * quarter / tolerance::BYTES_PER_FACE;
 }
 
-void limitTime(MonitorConfig& config) { config.monitor.detector.max_compute_ms = config.max_compute_s * 1e3; }
-
 /// A tool has the limits that it is given, the node all of them (limitLive).
 void readLimits(ParameterReader& reader, MonitorConfig& config) {
   config.max_memory_bytes = reader.integer("max_memory_mb", config.max_memory_bytes >> 20, 16, 1 << 20) << 20;
-  config.max_compute_s = reader.number("max_compute_s", config.max_compute_s, 0, LARGE);
   if (reader.has("max_memory_mb")) limitMemory(config);
-  if (reader.has("max_compute_s")) limitTime(config);
 }
 
 void readEffects(ParameterReader section, MonitorConfig& config) {
@@ -127,11 +140,8 @@ void readEffects(ParameterReader section, MonitorConfig& config) {
 }
 
 void readMarkers(ParameterReader section, MarkerConfig& markers) {
+  refuseGone(section, "markers/");
   markers.point_size_m = section.number("point_size_m", markers.point_size_m, 1e-6, LARGE);
-  markers.normal_length_m = section.number("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
-  markers.line_width_m = section.number("line_width_m", markers.line_width_m, 1e-6, LARGE);
-  markers.max_contacts = section.integer("max_contacts", markers.max_contacts, 1, MANY);
-  markers.swept = section.get("swept", markers.swept);
   markers.mesh = section.get("mesh", markers.mesh);
   markers.obstacle_m = section.number("obstacle_m", markers.obstacle_m, 0, LARGE);
   section.finish();
@@ -139,7 +149,7 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
 
 void readClearance(ParameterReader section, MonitorConfig& config) {
   ClearanceOptions& clearance = config.monitor.detector.clearance;
-  clearance.tolerance_m = section.number("tolerance_m", clearance.tolerance_m, 1e-9, 1);
+  refuseGone(section, "clearance/");
   clearance.max_m = section.number("max_m", clearance.max_m, 1e-6, LARGE);
   clearance.self_m = section.number("self_m", clearance.self_m, 0, LARGE);
   config.markers.clearance_max_m = clearance.max_m;
@@ -248,9 +258,18 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 
 }  // namespace
 
+void refuseGone(ParameterReader& reader, const std::string& section) {
+  for (const auto& [name, instead] : GONE) {
+    const std::string path = name;
+    if (path.compare(0, section.size(), section) != 0) continue;
+    const std::string own = path.substr(section.size());
+    if (own.find('/') == std::string::npos && reader.has(own)) reader.fail(own, std::string("is gone: ") + instead);
+  }
+}
+
 void limitLive(MonitorConfig& config) {
   limitMemory(config);
-  limitTime(config);
+  config.monitor.detector.max_compute_ms = MAX_COMPUTE_MS;
   if (config.max_map_bytes == NO_MAP_LIMIT) config.max_map_bytes = MonitorConfig().max_map_bytes;
 }
 
@@ -283,6 +302,7 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path, const
 MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, const RobotLoader& load) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
+  refuseGone(reader, "");
   config.fixed_frame = reader.frame("fixed_frame");
   readAccuracy(reader, config);
   readThresholds(reader, config);

@@ -10,11 +10,11 @@
 
 #include <xmlrpcpp/XmlRpcValue.h>
 
+#include "base/cloud_map.h"
+#include "base/effect_plan.h"
 #include "config/parameter_reader.h"
 #include "config/robot_config.h"
-#include "dccd/cloud_map.h"
-#include "dccd/effect_plan.h"
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 
@@ -55,12 +55,11 @@ struct CloudSource {
 
 struct MarkerConfig {
   double point_size_m = 0.01;
-  double normal_length_m = 0.05;
-  double line_width_m = 0.002;
-  int max_contacts = 2000;
-  bool swept = false;     ///< show what is watched of rigid bodies, and their separation
-  bool mesh = false;      ///< republish the bodies as markers
-  double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
+  int max_contacts = 2000;  ///< the first ones are shown
+  bool mesh = false;        ///< republish the bodies as markers
+  double obstacle_m = 0;    ///< show the map's voxels this close to the box around the bodies [m]; 0: none
+  double normalLength() const { return 5 * point_size_m; }
+  double lineWidth() const { return point_size_m / 5; }
   double clearance_max_m = ClearanceOptions().max_m;  ///< distances of this and more are green [m]
 };
 
@@ -106,14 +105,11 @@ struct MonitorConfig {
   std::size_t max_map_bytes = std::size_t{512} << 20;     ///< see limitLive(); NO_MAP_LIMIT: none
   std::size_t max_memory_bytes = std::size_t{512} << 20;  ///< see limitLive()
   std::size_t max_queue_bytes = 0;                        ///< a quarter of it where it holds; 0: no limit
-  double max_compute_s = 0.5;
   double transform_timeout_s = 0.2;
   double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
-  std::string simd_target = "auto";
   std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
-  std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
   std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
   /// The bodies as the monitor is given them.
@@ -151,22 +147,20 @@ struct MonitorConfig {
 };
 
 /// What can be changed while the node runs: LIVE(its name in cfg/CollisionMonitor.cfg, where MonitorConfig has it).
-#define DCCD_LIVE_SETTINGS(LIVE)                            \
-  LIVE(accuracy, monitor.detector.accuracy.rung)            \
-  LIVE(step_budget_ms, monitor.detector.step_budget_ms)     \
-  LIVE(max_step_s, monitor.store.max_step_s)                \
-  LIVE(max_vertex_step_m, monitor.store.max_vertex_step_m)  \
-  LIVE(max_contacts, monitor.detector.max_contacts)         \
-  LIVE(suppress_initial, monitor.detector.suppress_initial) \
-  LIVE(marker_point_size_m, markers.point_size_m)           \
-  LIVE(marker_normal_length_m, markers.normal_length_m)     \
-  LIVE(marker_mesh, markers.mesh)                           \
+#define DCCD_LIVE_SETTINGS(LIVE)                           \
+  LIVE(accuracy, monitor.detector.accuracy.rung)           \
+  LIVE(step_budget_ms, monitor.detector.step_budget_ms)    \
+  LIVE(max_step_s, monitor.store.max_step_s)               \
+  LIVE(max_vertex_step_m, monitor.store.max_vertex_step_m) \
+  LIVE(max_contacts, monitor.detector.max_contacts)        \
+  LIVE(marker_point_size_m, markers.point_size_m)          \
+  LIVE(marker_mesh, markers.mesh)                          \
   LIVE(marker_obstacle_m, markers.obstacle_m)
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~", const RobotLoader& load = {});
 MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, const RobotLoader& load = {});
-/// What bounds a live node's steps, from max_memory_mb, max_map_mb and max_compute_s, defaults included. Elsewhere a
+/// What bounds a live node's steps, from max_memory_mb and max_map_mb, defaults included. Elsewhere a
 /// limit that was not given is none, so that no answer depends on a clock.
 void limitLive(MonitorConfig& config);
 

@@ -5,9 +5,9 @@
 #include <iterator>
 #include <vector>
 
+#include "base/decimal.h"
+#include "base/regular_file.h"
 #include "config/parameter_tree.h"
-#include "dccd/decimal.h"
-#include "dccd/regular_file.h"
 
 namespace dccd {
 

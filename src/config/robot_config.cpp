@@ -43,6 +43,7 @@ LinkSettings readLink(ParameterReader section) {
 
 RobotConfig readRobotParameters(ParameterReader section) {
   RobotConfig robot;
+  refuseGone(section, "robot/");
   robot.description = section.get("description", std::string());
   if (robot.description.empty())
     section.fail("description", "is needed: the parameter that holds the URDF, or its file");
@@ -51,7 +52,6 @@ RobotConfig readRobotParameters(ParameterReader section) {
   robot.padding_m = section.number("padding_m", robot.padding_m, 0, LARGE);
   robot.own_voxels_m = ownVoxelsOf(section, robot.own_voxels_m);
   robot.max_own_voxels = section.integer("max_own_voxels", robot.max_own_voxels, 0, MANY);
-  robot.scale = section.number("scale", robot.scale, 1e-6, 1e6);
   if (section.has("max_speed_m_s")) robot.speed = speedBoundOf(section, {});
   if (section.has("speed_factor")) robot.speed_factor = section.number("speed_factor", 1, 1e6);
   robot.visuals = section.get("visuals", robot.visuals);

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "dccd/body.h"
-#include "dccd/expectation.h"
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
+#include "dccd/step.h"
 #include "input/mesh_resource.h"
 
 namespace dccd {
@@ -68,7 +68,7 @@ struct Robot {
   std::vector<std::pair<std::string, std::string>> never_meet;  ///< links, by disable_collisions
   std::vector<std::string> missing;                             ///< what should be watched and is not: a sentence each
   std::vector<std::string> excluded;                            ///< what has no surface to watch: a clause each
-  std::vector<std::string> remarks;                             ///< what its owner should see: a sentence each
+  std::vector<std::string> hints;                               ///< what its owner should see: a sentence each
   std::string text;                                             ///< of both files
   std::map<std::string, std::string> parameters;                ///< resolved names: what they held, or nothing
 };

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "culling/cluster_tree.h"
-#include "dccd/deadline.h"
+#include "dccd/types.h"
 
 namespace dccd {
 

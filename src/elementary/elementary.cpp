@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "elementary/batch_input.h"
 
 namespace dccd {

@@ -14,7 +14,7 @@
 
 #include <Eigen/Geometry>
 
-#include "dccd/decimal.h"
+#include "base/decimal.h"
 #include "dccd/tolerances.h"
 
 namespace dccd {
@@ -364,7 +364,7 @@ MeshFile loadDaeFile(const std::string& path) {
     return "polygon " + std::to_string(p) + " of the scene" +
            (line > 0 ? ", a segment of <lines> in line " + std::to_string(line) : "");
   };
-  remarkUnchecked(name, mesh);
+  hintAtUnchecked(name, mesh);
   return mesh;
 }
 

@@ -1,23 +1,17 @@
 #include "input/master_question.h"
 
-#include <cstdint>
-
 #include <ros/master.h>
-#include <ros/network.h>
 #include <ros/this_node.h>
 #include <xmlrpcpp/XmlRpcClient.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
 namespace dccd {
 
-namespace {
-
-bool ask(const std::string& host, std::uint32_t port, const char* method, const std::string& argument, double timeout_s,
-         XmlRpc::XmlRpcValue& answer) {
+bool askMaster(const char* method, const std::string& argument, double timeout_s, XmlRpc::XmlRpcValue& answer) {
   XmlRpc::XmlRpcValue request, response;
   request[0] = ros::this_node::getName();
   if (!argument.empty()) request[1] = argument;
-  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+  XmlRpc::XmlRpcClient client(ros::master::getHost().c_str(), static_cast<int>(ros::master::getPort()), "/");
   if (!client.executeNonBlock(method, request)) return false;
   client._disp.work(timeout_s * 1e3);
   const bool done = client.executeCheckDone(response) && !client.isFault();
@@ -27,12 +21,6 @@ bool ask(const std::string& host, std::uint32_t port, const char* method, const 
   if (response[0].getType() != XmlRpc::XmlRpcValue::TypeInt || static_cast<int>(response[0]) != 1) return false;
   answer = response[2];
   return true;
-}
-
-}  // namespace
-
-bool askMaster(const char* method, const std::string& argument, double timeout_s, XmlRpc::XmlRpcValue& answer) {
-  return ask(ros::master::getHost(), ros::master::getPort(), method, argument, timeout_s, answer);
 }
 
 std::optional<std::map<std::string, std::string>> publishedTopics(double timeout_s) {
@@ -62,19 +50,6 @@ std::optional<std::vector<std::string>> registeredPublishers(const std::string& 
     return {};
   }
   return nodes;
-}
-
-bool answers(const std::string& node, double timeout_s) {
-  XmlRpc::XmlRpcValue address, process;
-  std::string host;
-  std::uint32_t port = 0;
-  try {
-    return askMaster("lookupNode", node, timeout_s, address) &&
-           ros::network::splitURI(static_cast<std::string&>(address), host, port) &&
-           ask(host, port, "getPid", "", timeout_s, process);
-  } catch (const XmlRpc::XmlRpcException&) {
-    return false;
-  }
 }
 
 }  // namespace dccd

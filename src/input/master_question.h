@@ -17,9 +17,6 @@ std::optional<std::map<std::string, std::string>> publishedTopics(double timeout
 /// The nodes that are registered as publishers of the topic, those that were killed included. Nothing: as above.
 std::optional<std::vector<std::string>> registeredPublishers(const std::string& topic, double timeout_s);
 
-/// Whether the node answers within the time, and the master about it: one that was killed or hangs does not.
-bool answers(const std::string& node, double timeout_s);
-
 /// The master's answer to one of its methods, called with this node's name and `argument`. False: none in time, or one
 /// that reports a failure.
 bool askMaster(const char* method, const std::string& argument, double timeout_s, XmlRpc::XmlRpcValue& answer);

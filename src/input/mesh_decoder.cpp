@@ -72,7 +72,7 @@ Eigen::Affine3d poseAndScaleOf(const MarkerView& marker) {
 }
 
 /// Empty: there is nothing to say.
-std::string rowStepRemark(const CloudView& cloud) {
+std::string rowStepHint(const CloudView& cloud) {
   if (!cloud.wrong_row_step) return {};
   return "row_step " + std::to_string(*cloud.wrong_row_step) + " contradicts the data, which are just " +
          std::to_string(cloud.height) + " rows of " + std::to_string(cloud.width) + " points of " +
@@ -131,7 +131,7 @@ void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std:
 
 void MeshDecoder::checkCount(std::size_t count) const {
   if (count > config_.max_vertices) {
-    refuse(std::to_string(count) + " vertices are more than max_vertices " + std::to_string(config_.max_vertices));
+    refuse(std::to_string(count) + " vertices are more than a mesh may have, " + std::to_string(config_.max_vertices));
   }
   if (count == 0) refuse("there are no vertices");
 }
@@ -228,7 +228,7 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   }
   DecodedMesh mesh;
   start(cloud.header, mesh);
-  mesh.row_step_remark = rowStepRemark(cloud);
+  mesh.row_step_hint = rowStepHint(cloud);
   const std::size_t pixels = keptPixels(cloud, config_.depth.stride);
   checkCount(pixels);
   checkFaces(2 * pixels);
@@ -258,7 +258,7 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   if (config_.source == TopologySource::DEPTH_IMAGE) return decodeDepthImage(cloud);
   DecodedMesh mesh;
   start(cloud.header, mesh);
-  mesh.row_step_remark = rowStepRemark(cloud);
+  mesh.row_step_hint = rowStepHint(cloud);
   checkCount(cloud.size());
   const bool organised = cloud.height > 1;
   if (config_.source == TopologySource::MESSAGE || config_.source == TopologySource::FIRST_FRAME_WELD) {
@@ -272,9 +272,9 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   }
   if (!is_rope) takeFixed(cloud.size(), cloud.height, cloud.width, mesh);
   if (!is_rope && !hasFixedTopology() && cloud.size() >= LEAST_PICTURE) {
-    mesh.camera_remark = "a cloud of " + std::to_string(cloud.width) + " x " + std::to_string(cloud.height) +
-                         " points is taken for a grid, whose points are the same ones in each frame; if it is a depth "
-                         "camera's, name it as obstacle_cloud, or set topology/source: depth_image and motion: static";
+    mesh.camera_hint = "a cloud of " + std::to_string(cloud.width) + " x " + std::to_string(cloud.height) +
+                       " points is taken for a grid, whose points are the same ones in each frame; if it is a depth "
+                       "camera's, name it as obstacle_cloud, or set topology/source: depth_image and motion: static";
   }
   mesh.positions.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
@@ -323,7 +323,7 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   } else {
     takeFixed(count, 0, 0, mesh);
   }
-  if (view.cloud) mesh.row_step_remark = rowStepRemark(*view.cloud);
+  if (view.cloud) mesh.row_step_hint = rowStepHint(*view.cloud);
   addRadii(view.cloud ? &*view.cloud : nullptr, mesh);
   return mesh;
 }

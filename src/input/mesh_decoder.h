@@ -60,8 +60,8 @@ struct DecodedMesh : MeshFrame {
   std::size_t weld_changes = 0;    ///< welded vertices whose corners came apart
   std::size_t unread_lists = 0;    ///< triangle lists beside the one that was taken
   std::size_t no_measurement = 0;  ///< pixels of a depth image that are none
-  std::string camera_remark;    ///< that it looks like a depth camera's picture, taken for a grid; empty: it does not
-  std::string row_step_remark;  ///< what a cloud says that its data contradict; empty: nothing
+  std::string camera_hint;    ///< that it looks like a depth camera's picture, taken for a grid; empty: it does not
+  std::string row_step_hint;  ///< what a cloud says that its data contradict; empty: nothing
 };
 
 /// Keeps the topology from message to message, so that an unchanged one is one object. Not thread-safe.

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <map>
 
-#include "dccd/regular_file.h"
+#include "base/regular_file.h"
 #include "input/soup_weld.h"
 
 namespace dccd {
@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{512} << 20;
 
 /// Empty: all are checked.
-std::string uncheckedRemark(const MeshFile& mesh) {
+std::string uncheckedHint(const MeshFile& mesh) {
   if (mesh.unchecked.empty()) return {};
   return std::to_string(mesh.unchecked.size()) + " polygons cannot be used and are unchecked, the first is " +
          mesh.polygon_name(mesh.unchecked[0]);
@@ -55,9 +55,9 @@ std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh) {
   return std::move(made.ends);
 }
 
-void remarkUnchecked(std::function<std::string(std::size_t)> name, MeshFile& mesh) {
+void hintAtUnchecked(std::function<std::string(std::size_t)> name, MeshFile& mesh) {
   mesh.polygon_name = std::move(name);
-  if (!mesh.unchecked.empty()) mesh.remarks.push_back(uncheckedRemark(mesh));
+  if (!mesh.unchecked.empty()) mesh.hints.push_back(uncheckedHint(mesh));
 }
 
 bool isPadding(std::string_view bytes) {
@@ -102,10 +102,10 @@ std::size_t matchSoups(std::vector<MeshFile>& frames) {
     positions.reserve(weld.cornerOfVertex().size());
     for (const Index corner : weld.cornerOfVertex()) positions.push_back(frame.positions[corner]);
     frame.positions = std::move(positions);
-    auto& remarks = frame.remarks;
-    remarks.erase(std::remove(remarks.begin(), remarks.end(), uncheckedRemark(frame)), remarks.end());
+    auto& hints = frame.hints;
+    hints.erase(std::remove(hints.begin(), hints.end(), uncheckedHint(frame)), hints.end());
     setPolygons({weld.vertexOfCorner(), std::move(frame.polygons.ends)}, frame);
-    remarkUnchecked(std::move(frame.polygon_name), frame);
+    hintAtUnchecked(std::move(frame.polygon_name), frame);
   }
   return apart;
 }

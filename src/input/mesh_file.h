@@ -28,7 +28,7 @@ struct MeshFile {
   Polygons polygons;                   ///< as the file has them
   std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face
   std::vector<Edge> edges;             ///< of ropes: lines of an OBJ, edges of a PLY, which then have no faces
-  std::vector<std::string> remarks;    ///< sentences about what was skipped, for the user to see
+  std::vector<std::string> hints;      ///< sentences about what was skipped, for the user to see
   bool is_soup = false;                ///< vertices are corners of equal coordinates, not what the file numbers
   std::function<std::string(std::size_t)> polygon_name;  ///< where a polygon stands in the file, in words
 };
@@ -42,8 +42,8 @@ void requireReadable(const std::string& path);
 std::string readWholeFile(const std::string& path);
 /// Makes the mesh's faces of the polygons. Returns where each polygon ends among the faces.
 std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh);
-/// A remark where polygons are unchecked. `name` becomes the mesh's.
-void remarkUnchecked(std::function<std::string(std::size_t)> name, MeshFile& mesh);
+/// A hint where polygons are unchecked. `name` becomes the mesh's.
+void hintAtUnchecked(std::function<std::string(std::size_t)> name, MeshFile& mesh);
 /// What stands behind the end of a binary file can hold no geometry: zeros, blanks and ends of lines.
 bool isPadding(std::string_view bytes);
 /// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first

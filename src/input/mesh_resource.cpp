@@ -60,7 +60,7 @@ MeshResource resourceOf(const std::string& path, double scale) {
     resource.positions = std::move(mesh.positions);
     resource.file_faces = std::move(mesh.faces);
     resource.groups = std::move(mesh.groups);
-    resource.remarks = std::move(mesh.remarks);
+    resource.hints = std::move(mesh.hints);
   } catch (const MeshFileError& error) {
     throw std::invalid_argument(error.what());
   } catch (const TopologyError& error) {

@@ -14,8 +14,8 @@ struct MeshResource {
   Positions positions;           ///< [m], after scaling
   std::vector<Face> file_faces;  ///< which the groups count; the topology has equal ones once
   FaceGroups groups;
-  std::uint64_t dropped_faces = 0;   ///< polygons that cannot be used: unchecked
-  std::vector<std::string> remarks;  ///< about what of the file was skipped
+  std::uint64_t dropped_faces = 0;  ///< polygons that cannot be used: unchecked
+  std::vector<std::string> hints;   ///< about what of the file was skipped
 
   /// The vertices of a group's faces, each once, in order; empty where there is no such group.
   std::vector<Index> verticesOf(const std::string& group) const;

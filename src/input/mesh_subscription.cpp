@@ -6,8 +6,6 @@
 
 #include <ros/console.h>
 #include <ros/exceptions.h>
-#include <ros/subscribe_options.h>
-#include <ros/this_node.h>
 
 #include "input/master_question.h"
 #include "input/message_bytes.h"
@@ -20,8 +18,6 @@ namespace {
 using topic_tools::ShapeShifter;
 
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
-// The bytes of what was handed over follow within a moment; when they do not, a queue was full and they will not come.
-const ros::WallDuration MAX_OVERLAP(1.0);
 // A topic that has been quiet so long may have lost its publisher. Asked about so often, and at once when the last
 // publisher has gone.
 constexpr std::int64_t SILENCE_NS = 1000000000, LOOK_NS = 500000000, LOST_LOOK_NS = 200000000;
@@ -30,147 +26,111 @@ constexpr std::int64_t ATTEMPT_NS = 1000000000;
 constexpr std::size_t MAX_DOUBLINGS = 5;
 constexpr double MASTER_TIMEOUT_S = 0.5;
 
-/// Whether the bytes are this message. The header's sequence number is set when bytes are sent, and does not count.
-bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
-  if (bytes.getDataType() != mesh.type->datatype) return false;
-  const std::vector<std::uint8_t> a = bytesOf(bytes), b = mesh.type->serialize(mesh.message.get());
-  const std::ptrdiff_t skipped = mesh.type->leads_with_header ? 4 : 0;
-  return a.size() == b.size() && std::equal(a.begin() + skipped, a.end(), b.begin() + skipped);
-}
-
 }  // namespace
 
 void tellLost(const std::string& topic, const std::exception& error) {
   ROS_WARN_STREAM_THROTTLE(5, topic << ": a message was lost: " << error.what());
 }
 
-MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topic, Callback callback)
-    : node_(node), topic_(node_.resolveName(topic)), callback_(std::move(callback)), last_message_ns_(steadyNs()) {
-  open(nullptr);
+MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topic, const MeshType* objects_of,
+                                   Callback callback)
+    : node_(node),
+      topic_(node_.resolveName(topic)),
+      objects_of_(objects_of),
+      callback_(std::move(callback)),
+      last_message_ns_(steadyNs()) {
+  if (objects_of_) {
+    openToObjects();
+  } else {
+    open(nullptr);
+  }
 }
 
+MeshSubscription::~MeshSubscription() { close(); }
+
 void MeshSubscription::close() {
-  ros::Subscriber any, typed;
+  ros::Subscriber subscriber;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    any = endOverlap();
-    typed = std::exchange(typed_, {});
+    subscriber = std::exchange(subscriber_, {});
     has_type_ = false;
     heard_type_.clear();
   }
-  // These wait for a callback that runs, which may wait for the mutex.
-  any.shutdown();
-  typed.shutdown();
+  subscriber.shutdown();  // waits for a callback that runs, which may wait for the mutex
 }
 
 void MeshSubscription::open(const MeshType* type) {
   close();
   ros::SubscribeOptions options;
   options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
-      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onAny(event); });
+      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onBytes(event); });
   if (type) {
     options.md5sum = type->md5;
     options.datatype = type->datatype;
   }
+  subscribe(options);
+}
+
+void MeshSubscription::openToObjects() {
+  const MeshType& type = *objects_of_;
+  ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
+  options.helper = type.receiver(type, came_, [this](const TypedMesh& object) { onObject(object); });
+  subscribe(options);
+}
+
+void MeshSubscription::subscribe(ros::SubscribeOptions& options) {
   options.transport_hints = ros::TransportHints().tcpNoDelay();
   ros::Subscriber opened = node_.subscribe(options);
   const std::lock_guard<std::mutex> lock(mutex_);
-  any_ = std::move(opened);
+  subscriber_ = std::move(opened);
 }
 
-void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event) try {
+void MeshSubscription::heard(const std::string& type) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_message_ns_ = steadyNs();
+  has_type_ = true;  // the publisher may come and go between two looks
+  heard_type_ = type;
+}
+
+void MeshSubscription::onBytes(const ros::MessageEvent<const ShapeShifter>& event) try {
   const ShapeShifter::ConstPtr bytes = event.getConstMessage();
-  ros::Subscriber ended;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    last_message_ns_ = steadyNs();
-    has_type_ = true;  // the publisher may come and go between two looks
-    heard_type_ = bytes->getDataType();
-    // Before any_ is known there is nothing to narrow: the first message may overtake open().
-    if (!typed_ && any_ && event.getPublisherName() == ros::this_node::getName() &&
-        meshTypeProblem(heard_type_, bytes->getMD5Sum()).empty()) {
-      narrowTo(*findMeshType(heard_type_));
-    }
-    if (typed_ && !held_.empty() && isSame(*bytes, held_.front())) {
-      ended = endOverlap();
-    } else {
-      if (typed_) last_bytes_ = bytes;
-      MeshMessage message;
-      message.datatype = heard_type_;
-      message.md5 = bytes->getMD5Sum();
-      const MeshType* type = findMeshType(heard_type_);
-      if (type && message.md5 != type->md5) message.definition = bytes->getMessageDefinition();
-      if (hasMemoryFor(bytes->size())) {
-        message.bytes = bytesOf(*bytes);
-      } else {
-        message.no_memory = bytes->size();
-      }
-      message.number = ++came_;
-      callback_(std::move(message));
-    }
+  MeshMessage message;
+  message.datatype = bytes->getDataType();
+  heard(message.datatype);
+  message.md5 = bytes->getMD5Sum();
+  const MeshType* type = findMeshType(message.datatype);
+  if (type && message.md5 != type->md5) message.definition = bytes->getMessageDefinition();
+  if (hasMemoryFor(bytes->size())) {
+    message.bytes = bytesOf(*bytes);
+  } else {
+    message.no_memory = bytes->size();
   }
-  ended.shutdown();
+  message.number = ++*came_;
+  callback_(std::move(message));
 } catch (const std::exception& error) {
-  ++came_;
+  ++*came_;
   tellLost(topic_, error);
 }
 
-/// Until the first subscription is closed, every message comes both ways: as an object at once, as bytes a little
-/// later. An object thus overtakes the bytes of the messages before it. To keep the order, the first objects are held
-/// back until their bytes have come. A message that was on its way as bytes when the second subscription was made comes
-/// through both: what the second brings of it is dropped here, even behind objects that overtook it.
-void MeshSubscription::onTyped(TypedMesh message) try {
-  ros::Subscriber ended;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    last_message_ns_ = steadyNs();
-    if (!any_) return deliver(std::move(message));
-    if (last_bytes_ && isSame(*last_bytes_, message)) {  // came as bytes already
-      if (held_.empty()) ended = endOverlap();
-    } else {
-      held_.push_back(std::move(message));
-      if (held_.size() >= SUBSCRIBER_QUEUE) ended = endOverlap();
-    }
-  }
-  ended.shutdown();
-} catch (const std::exception& error) {
-  ++came_;
-  tellLost(topic_, error);
-}
-
-ros::Subscriber MeshSubscription::endOverlap() {
-  last_bytes_.reset();
-  for (TypedMesh& message : held_) deliver(std::move(message));
-  held_.clear();
-  return std::exchange(any_, {});
-}
-
-void MeshSubscription::deliver(TypedMesh object) {
+void MeshSubscription::onObject(const TypedMesh& object) try {
+  heard(object.type->datatype);
   MeshMessage message;
   message.datatype = object.type->datatype;
-  message.object = std::move(object);
-  message.number = ++came_;
+  message.object = object;
+  message.number = ++*came_;
   callback_(std::move(message));
-}
-
-/// No question to the master: it joins the subscription that there is.
-void MeshSubscription::narrowTo(const MeshType& type) {
-  narrowed_at_ = ros::SteadyTime::now();
-  ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
-  options.helper = type.callbackHelper(type, [this](TypedMesh message) { onTyped(std::move(message)); });
-  options.transport_hints = ros::TransportHints().tcpNoDelay();
-  typed_ = node_.subscribe(options);
+} catch (const std::exception& error) {
+  ++*came_;
+  tellLost(topic_, error);
 }
 
 bool MeshSubscription::wantsRenewal() {
-  ros::Subscriber ended, open;
+  ros::Subscriber subscriber;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (any_ && !held_.empty() && ros::SteadyTime::now() - narrowed_at_ > MAX_OVERLAP) ended = endOverlap();
-    open = any_ ? any_ : typed_;
+    subscriber = subscriber_;
   }
-  ended.shutdown();
-  const std::uint32_t publishers = open ? open.getNumPublishers() : 0;
+  const std::uint32_t publishers = subscriber ? subscriber.getNumPublishers() : 0;
   bool lost = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -178,6 +138,7 @@ bool MeshSubscription::wantsRenewal() {
     lost = has_type_ && publishers == 0;
   }
   publishers_ = publishers;
+  if (objects_of_) return false;  // it takes on no other publisher's type
   const std::int64_t now_ns = steadyNs();
   if ((!lost && now_ns - last_message_ns_ < SILENCE_NS) || now_ns < next_look_ns_) return false;
   next_look_ns_ = now_ns + (lost ? LOST_LOOK_NS : LOOK_NS);

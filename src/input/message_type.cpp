@@ -46,6 +46,13 @@ const MeshType* findMeshType(const std::string& datatype) {
   return nullptr;
 }
 
+const MeshType* findMeshTypeNamed(const std::string& name) {
+  for (const MeshType& type : meshTypes()) {
+    if (name == type.name) return &type;
+  }
+  return nullptr;
+}
+
 std::string md5Problem(const std::string& datatype, const std::string& md5, const std::string& known) {
   if (md5 == known || md5 == "*") return {};
   return "type " + datatype + " has md5 " + md5 + ", known is " + known +

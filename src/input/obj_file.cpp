@@ -4,7 +4,7 @@
 #include <set>
 #include <string_view>
 
-#include "dccd/decimal.h"
+#include "base/decimal.h"
 #include "input/polygons.h"
 #include "input/text_lines.h"
 
@@ -45,11 +45,11 @@ class ObjReader {
     if (furthest_ >= mesh_.positions.size()) lines_.fail(furthest_word_, missing());
     if (polygons_.size() > 0) makePolygonsOfLines();
     nameGroups(setPolygons(std::move(polygons_), mesh_));
-    remarkUnchecked([lines = std::move(face_lines_)](std::size_t p) { return "in line " + std::to_string(lines[p]); },
+    hintAtUnchecked([lines = std::move(face_lines_)](std::size_t p) { return "in line " + std::to_string(lines[p]); },
                     mesh_);
     if (unknown_lines_ > 0) {
-      mesh_.remarks.push_back(std::to_string(unknown_lines_) +
-                              " lines with unknown keywords are skipped, the first is " + first_unknown_);
+      mesh_.hints.push_back(std::to_string(unknown_lines_) + " lines with unknown keywords are skipped, the first is " +
+                            first_unknown_);
     }
     return std::move(mesh_);
   }

@@ -79,7 +79,7 @@ class PlyBody {
     if (is_text_) lines_.fail(row() + " " + what);
     throw MeshFileError(path_ + ": " + row() + " " + what);
   }
-  /// After the last row. A remark, or nothing.
+  /// After the last row. A hint, or nothing.
   std::string finish() {
     const std::string low = "all that the header counts: its counts are too low";
     if (is_text_ && lines_.nextWithWords()) lines_.fail(lines_.words()[0], "stands after " + low);
@@ -141,7 +141,7 @@ class PlyReader {
         skip(element, body);
       }
     }
-    if (std::string remark = body.finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
+    if (std::string hint = body.finish(); !hint.empty()) mesh_.hints.push_back(std::move(hint));
     const std::size_t edges_begin = polygons_.size();
     if (hasFaces()) makePolygonsOfEdges();
     setPolygons(std::move(polygons_), mesh_);
@@ -152,7 +152,7 @@ class PlyReader {
       const auto strip = std::upper_bound(strips.begin(), strips.end(), p) - strips.begin();
       return "a triangle of strip " + std::to_string(strip);
     };
-    remarkUnchecked(name, mesh_);
+    hintAtUnchecked(name, mesh_);
     return std::move(mesh_);
   }
 
@@ -214,8 +214,7 @@ class PlyReader {
     forRows(
         element, body, [&](std::size_t p) { skipValue(element.properties[p], body); }, [] {});
     if (element.count == 0) return;
-    mesh_.remarks.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) +
-                            ") is skipped");
+    mesh_.hints.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) + ") is skipped");
   }
 
   /// The place of the one property of one of these names.

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "dccd/decimal.h"
+#include "base/decimal.h"
 
 namespace dccd {
 namespace ply {

@@ -25,13 +25,11 @@ std::string meshTopics(const std::map<std::string, std::string>& types) {
 /// Empty: its publisher lives, and need not say anything.
 std::string whySilent(const AwaitedTopic& topic) {
   const std::string nobody = "nobody publishes " + topic.name + (topic.heard ? " any more" : "");
-  if (!topic.dead.empty()) return nobody + ": " + topic.dead + " does not answer; start it again";
   if (topic.publishers == 0) return nobody + (topic.heard ? "; start its publisher again" : "");
   if (topic.named_by.empty()) return "";
-  return topic.name +
-         (topic.heard ? " has fallen silent, though its publisher lives"
-                      : " has a publisher, but no message has come") +
-         " (see rostopic hz)";
+  // One that was killed stays connected.
+  return topic.name + (topic.heard ? " has fallen silent" : " has a publisher, but no message has come") +
+         " (see rostopic hz and rosnode ping)";
 }
 
 }  // namespace

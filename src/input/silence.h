@@ -14,7 +14,6 @@ struct AwaitedTopic {
   std::uint32_t publishers = 0;  ///< connected
   std::string named_by;          ///< the argument or parameter that gives it; empty: a map's
   bool heard = false;            ///< messages have come before
-  std::string dead;              ///< the publishers, where there are some and none of them answers
 };
 
 /// A sentence about the clock or about topics from which nothing comes, with what to do; empty when all is well.

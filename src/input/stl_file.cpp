@@ -39,7 +39,7 @@ class AsciiReader {
     const auto name = [lines = std::move(facet_lines_)](std::size_t t) {
       return "triangle " + std::to_string(t) + ", in line " + std::to_string(lines[t]);
     };
-    remarkUnchecked(name, mesh);
+    hintAtUnchecked(name, mesh);
     return mesh;
   }
 
@@ -116,8 +116,8 @@ MeshFile loadStlFile(const std::string& path) {
                         " that are not empty follow them; correct the count (byte 80), or cut them off");
   }
   MeshFile mesh = weldTriangles(binaryCorners(bytes, triangles), path);
-  remarkUnchecked([](std::size_t t) { return "triangle " + std::to_string(t); }, mesh);
-  if (bytes.size() > end) mesh.remarks.push_back(rest + " of padding after the last triangle are skipped");
+  hintAtUnchecked([](std::size_t t) { return "triangle " + std::to_string(t); }, mesh);
+  if (bytes.size() > end) mesh.hints.push_back(rest + " of padding after the last triangle are skipped");
   return mesh;
 }
 

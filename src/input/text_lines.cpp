@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "dccd/decimal.h"
+#include "base/decimal.h"
 #include "input/mesh_file.h"
 
 namespace dccd {

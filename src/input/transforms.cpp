@@ -153,7 +153,7 @@ void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, c
   // A frame that has had usable ones is not in want of a place.
   const Frame* frame = frameOf(unslashed(transform.child_frame_id));
   if (!known && !(frame && frame->is_static)) only_unusable_[child] = text;
-  if (told_.insert(child).second) complaints_.push_back(text);
+  if (told_.insert(child).second) problems_.push_back(text);
 }
 
 tf2_msgs::TFMessage::ConstPtr TransformFeed::read(const std::string& topic, std::vector<std::uint8_t> bytes) {
@@ -171,7 +171,7 @@ tf2_msgs::TFMessage::ConstPtr TransformFeed::read(const std::string& topic, std:
   } catch (const ros::serialization::StreamOverrunException&) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++unusable_;
-    if (told_.insert(topic).second) complaints_.push_back("a message on " + topic + " is damaged and left out");
+    if (told_.insert(topic).second) problems_.push_back("a message on " + topic + " is damaged and left out");
   }
   lose(topic == "/tf_static");
   return nullptr;
@@ -195,9 +195,9 @@ std::string TransformFeed::onlyUnusable() const {
   return text;
 }
 
-std::vector<std::string> TransformFeed::takeComplaints() {
+std::vector<std::string> TransformFeed::takeProblems() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return std::exchange(complaints_, {});
+  return std::exchange(problems_, {});
 }
 
 bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender) {

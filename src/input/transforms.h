@@ -83,7 +83,7 @@ class TransformFeed {
   /// Which frames have had no others, and why, in words; empty: none.
   std::string onlyUnusable() const;
   /// A line for each child frame that has had an unusable one, once.
-  std::vector<std::string> takeComplaints();
+  std::vector<std::string> takeProblems();
 
  private:
   struct Pose {
@@ -130,7 +130,7 @@ class TransformFeed {
   std::atomic<std::uint64_t> unusable_{0}, times_forgotten_{0};
   std::map<std::string, std::string> only_unusable_;  // per child frame that has had no usable one: what was wrong
   std::set<std::string> told_;
-  std::vector<std::string> complaints_;
+  std::vector<std::string> problems_;
 
   const Frame* frameOf(const std::string& name) const;
   Frame* roomFor(const std::string& name);

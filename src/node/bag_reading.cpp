@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "dccd/regular_file.h"
+#include "base/regular_file.h"
 #include "input/message_bytes.h"
 #include "input/short_text.h"
 
@@ -162,19 +162,19 @@ void openBag(const std::string& path, rosbag::Bag& bag) {
   if (const std::string problem = regularFileProblem(path); !problem.empty()) {
     throw std::runtime_error(path + ": " + problem);
   }
-  const std::string remedy = "; run: rosbag reindex " + path;
+  const std::string hint = "; run: rosbag reindex " + path;
   try {
     BagCheck(path).check();
     bag.open(path, rosbag::bagmode::Read);
   } catch (const rosbag::BagUnindexedException&) {
-    throw std::runtime_error(path + ": the bag has no index, as its recording was not ended" + remedy);
+    throw std::runtime_error(path + ": the bag has no index, as its recording was not ended" + hint);
   } catch (const rosbag::BagException& error) {
     std::string begin(MARK.size(), '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
     if (file.gcount() == 0) throw std::runtime_error(path + ": the file is empty: nothing was recorded");
     if (begin != MARK) throw std::runtime_error(path + ": the file is no bag: it does not begin with '" + MARK + "'");
-    throw std::runtime_error(path + ": the bag is cut or damaged (" + shortText(error.what()) + ")" + remedy);
+    throw std::runtime_error(path + ": the bag is cut or damaged (" + shortText(error.what()) + ")" + hint);
   }
 }
 

@@ -121,7 +121,7 @@ struct BagReplay::Run {
       }
     }
     for (const std::string& sentence : r.config_.robot.missing) complain(sentence);
-    for (const std::string& sentence : r.config_.robot.remarks) complain("robot: " + sentence);
+    for (const std::string& sentence : r.config_.robot.hints) complain("robot: " + sentence);
   }
 
   /// The prediction that follows from an answered outcome, whose statistics get its cost.
@@ -142,7 +142,7 @@ struct BagReplay::Run {
   }
 
   void complain(const std::string& text) {
-    if (complained.insert(text).second) summary.complaints.push_back(text);
+    if (complained.insert(text).second) summary.problems.push_back(text);
   }
 
   void setMap(LoadedMap map, std::int64_t now_ns) {
@@ -194,11 +194,11 @@ struct BagReplay::Run {
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
     }
     for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {
-      const std::string complaint = pipeline.takeComplaint(b);
-      if (!complaint.empty()) complain(sourceOf(b) + ": " + complaint);
+      const std::string problem = pipeline.takeProblem(b);
+      if (!problem.empty()) complain(sourceOf(b) + ": " + problem);
     }
-    const std::string note = pipeline.takeMapNote();
-    if (!note.empty()) complain(note);
+    const std::string hint = pipeline.takeMapHint();
+    if (!hint.empty()) complain(hint);
   }
 
   void mesh(std::size_t body, const rosbag::MessageInstance& message, std::vector<std::uint8_t> bytes) {
@@ -404,7 +404,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
       for (const std::size_t body : bodies->second) transforms.meshComes(body, stampOf(m.getDataType(), bytes), at);
     }
     transforms.feedUntil(at);
-    for (const std::string& line : run.feed.takeComplaints()) run.complain("tf: " + line);
+    for (const std::string& line : run.feed.takeProblems()) run.complain("tf: " + line);
     if (is_mesh) run.meshes(bodies->second, m, bytes);
     run.clouds.hearCameraInfo(m);
     const bool is_map = bag_maps && std::count(map_topics.begin(), map_topics.end(), m.getTopic()) > 0;

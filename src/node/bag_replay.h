@@ -34,9 +34,9 @@ struct BagReplayOptions {
 struct BagReplaySummary {
   std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
   std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0, points_no_measurement = 0;
-  std::string fixed_frame;              ///< at the end
-  std::string map_source;               ///< its topic or file, and who named it, in words
-  std::vector<std::string> complaints;  ///< refused messages, each kind once; maps that are missing or not listened to
+  std::string fixed_frame;            ///< at the end
+  std::string map_source;             ///< its topic or file, and who named it, in words
+  std::vector<std::string> problems;  ///< refused messages, each kind once; maps that are missing or not listened to
   std::vector<std::string> not_looked_at;  ///< a map that is not there, meshes that nobody listens to: a sentence each
   FrameCounters frames;
   EffectPlan effects;                          ///< at the end

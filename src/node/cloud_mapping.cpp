@@ -160,7 +160,7 @@ SensorView CloudMapping::readPicture(const CloudMessage& message, Reading& readi
     if (pinhole) break;
     if (!reading.mayWait()) {
       throw WireError("no CameraInfo has come on " + topic +
-                      "; name its topic, obstacle_camera_info_topic, or take the camera's cloud");
+                      "; name its topic by camera_info in obstacle_cloud_topics, or take the camera's cloud");
     }
   }
   if (!pinhole->problem.empty()) throw WireError("the CameraInfo on " + topic + ": " + pinhole->problem);
@@ -200,9 +200,9 @@ SensorView CloudMapping::readCloudOf(const CloudMessage& message, Reading& readi
     seen.map_from_sensor.translate(*from);
   } else if (sensor.empty() && frame == frame_) {
     throw WireError("it comes in the map's own frame '" + frame_ +
-                    "', which does not tell where the sensor was, so that it fills and clears nothing; set "
-                    "obstacle_sensor_frame to the sensor's frame, also where that is this one, or send the cloud as "
-                    "the sensor made it");
+                    "', which does not tell where the sensor was, so that it fills and clears nothing; name "
+                    "the sensor's frame by sensor_frame in obstacle_cloud_topics, also where that is this one, or send "
+                    "the cloud as the sensor made it");
   } else {
     pointsInto(cloud, numbers_);
   }
@@ -256,8 +256,8 @@ void CloudMapping::insert(const SensorView& seen, Reading& reading) {
   }
   if (counts.no_return > 0 && !counts.no_return_cleared) {
     const std::string& topic = config_.clouds[reading.view.first].topic;
-    reading.map.note = "the clouds on " + topic + " have infinite points: ";
-    reading.map.note +=
+    reading.map.hint = "the clouds on " + topic + " have infinite points: ";
+    reading.map.hint +=
         config_.cloud_map.no_return_clears
             ? "they are no pixels in rows, and nobody knows where these looked, so that what was there stays"
             : "nothing came back from there, and what was seen there before stays; obstacle_no_return: clears takes "

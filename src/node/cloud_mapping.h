@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "input/depth_picture.h"
 #include "input/transforms.h"
 #include "node/map_memory.h"

@@ -6,7 +6,6 @@
 #include <std_msgs/Bool.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "dccd/simd_target.h"
 #include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "node/robot_source.h"
@@ -50,11 +49,9 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
   MonitorConfig config =
       readConfig(tree, "~", robotOfParameters(node, goes_on, [&](const std::string& what) { early.say(what); }));
   for (const std::string& sentence : config.robot.missing) ROS_WARN_STREAM(sentence);
-  for (const std::string& sentence : config.robot.remarks) ROS_WARN_STREAM("robot: " << sentence);
+  for (const std::string& sentence : config.robot.hints) ROS_WARN_STREAM("robot: " << sentence);
   takeRemappings(node, config);
   limitLive(config);
-  // It is the process's: another nodelet may have named one, and its worker may be at it.
-  if (config.simd_target != "auto") setSimdTarget(config.simd_target);
   return config;
 }
 
@@ -89,7 +86,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
-  frames_handed_over += message.object.type != nullptr;
+  frames_handed_over += message.object.handed_over;
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
   // voxels are followed by where the bodies were.
   if (!enabled && !pipeline.isStatic(body) && !config.ownsVoxels()) {
@@ -106,7 +103,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
   const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(*event.getConstMessage()));
   if (message) feed.add(*message, is_static, event.getPublisherName());
-  for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
+  for (const std::string& line : feed.takeProblems()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
   feed.lose(is_static);
   tellLost(is_static ? "/tf_static" : "/tf", error);
@@ -151,8 +148,10 @@ void CollisionMonitor::Impl::subscribe() {
   mesh_subscriptions.resize(config.bodies.size());
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (config.bodies[b].isRigid()) continue;
+    const BodyConfig& body = config.bodies[b];
     mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
-        input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
+        input, body.topic, owns_process ? nullptr : findMeshTypeNamed(body.input.type),
+        [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
   const auto listenTo = [&](const std::string& topic, bool is_static) {
     ros::SubscribeOptions options;
@@ -230,16 +229,15 @@ void CollisionMonitor::Impl::endInTime() {
   }).detach();
 }
 
-CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node, Process process,
                                    const std::function<bool()>& goes_on)
     // The early state lives until the whole is made: its topics stay.
     : impl_(
           std::make_unique<Impl>(node, private_node, configOf(node, private_node, goes_on, EarlyState(private_node)))) {
+  impl_->owns_process = process == Process::OWN;
   impl_->start();
 }
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
-
-void CollisionMonitor::takeProcess() { impl_->owns_process = true; }
 
 }  // namespace dccd

@@ -105,7 +105,7 @@ struct CollisionMonitor::Impl {
   bool waitsForMap();
   bool mayTake(std::size_t body);
   bool holdsStaticFrames() const;
-  void tellComplaints();
+  void tellProblems();
   void publishOutcome(Outcome& outcome);
   void predict(Outcome& outcome);
   void publishPrediction(const Outcome& prediction);

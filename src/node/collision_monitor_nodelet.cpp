@@ -13,7 +13,8 @@ class CollisionMonitorNodelet : public nodelet::Nodelet {
  private:
   void onInit() override {
     try {
-      monitor_ = std::make_unique<CollisionMonitor>(getNodeHandle(), getPrivateNodeHandle());
+      monitor_ = std::make_unique<CollisionMonitor>(getNodeHandle(), getPrivateNodeHandle(),
+                                                    CollisionMonitor::Process::SHARED);
     } catch (const std::exception& error) {
       NODELET_FATAL_STREAM("collision_monitor cannot start: " << error.what());
       throw;  // the manager then refuses to load, but says nothing about why

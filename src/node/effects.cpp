@@ -93,16 +93,6 @@ bool EffectTracker::takeNewPlan() {
   return true;
 }
 
-bool EffectTracker::takeNewLeftOut(const Monitor& monitor) {
-  const auto same = [](const LeftOutPair& a, const LeftOutPair& b) {
-    return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex;
-  };
-  const std::vector<LeftOutPair>& now = monitor.leftOut();
-  if (std::equal(now.begin(), now.end(), told_left_out_.begin(), told_left_out_.end(), same)) return false;
-  told_left_out_ = now;
-  return true;
-}
-
 deformable_ccd::EffectArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
   deformable_ccd::EffectArray out;
   out.header.stamp = stamp;

@@ -37,8 +37,6 @@ class EffectTracker {
   void learn(const Outcome& outcome, const Monitor& monitor);
   /// True when the plan has changed since the last call, or at the first one.
   bool takeNewPlan();
-  /// True when the pairs that are left out have changed since the last call; not at first, while there are none.
-  bool takeNewLeftOut(const Monitor& monitor);
 
   const EffectPlan& plan() const { return plan_; }
   std::vector<std::string> lines() const { return plan_.lines(); }
@@ -49,7 +47,6 @@ class EffectTracker {
   EffectSettings settings_;
   bool promised_ = false;
   EffectPlan plan_, told_;
-  std::vector<LeftOutPair> told_left_out_;
 };
 
 }  // namespace dccd

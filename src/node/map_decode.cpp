@@ -6,9 +6,9 @@
 #include <limits>
 #include <new>
 
+#include "base/next_surface.h"
+#include "base/octomap_decode.h"
 #include "dccd/known_space.h"
-#include "dccd/next_surface.h"
-#include "dccd/octomap_decode.h"
 #include "dccd/tolerances.h"
 #include "input/known_types.h"
 #include "input/mesh_views.h"

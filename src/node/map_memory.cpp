@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "dccd/map_limits.h"
+#include "base/map_limits.h"
 #include "dccd/tolerances.h"
 
 namespace dccd {

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <memory>
 
+#include "base/octomap_decode.h"
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
-#include "dccd/octomap_decode.h"
 
 namespace dccd {
 

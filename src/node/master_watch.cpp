@@ -78,22 +78,6 @@ void MasterWatch::lookAtParameters() {
   if (changed != std::exchange(told_changed_, changed)) changed_(changed);
 }
 
-bool MasterWatch::isStopping() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return stopping_;
-}
-
-/// A publisher that was killed stays connected, as it were, and registered.
-void MasterWatch::findDead(AwaitedTopic& topic) {
-  if (topic.publishers == 0 || isStopping()) return;
-  std::string dead;
-  for (const std::string& name : registeredPublishers(topic.name, TIMEOUT_S).value_or(std::vector<std::string>())) {
-    if (isStopping() || answers(name, TIMEOUT_S)) return;
-    dead += (dead.empty() ? "" : ", ") + name;
-  }
-  topic.dead = dead;
-}
-
 void MasterWatch::look() {
   const auto isPublished = [](const ros::Subscriber& map) { return map.getNumPublishers() > 0; };
   if (std::any_of(maps_.begin(), maps_.end(), isPublished)) map_published_();
@@ -111,8 +95,6 @@ void MasterWatch::look() {
   // Without an answer nothing is renewed: roscpp's call would hang with the master.
   if (published) {
     for (MeshSubscription* mesh : wanting) mesh->renew(*published);
-    if (question)
-      std::for_each(question->silent.begin(), question->silent.end(), [this](auto& topic) { findDead(topic); });
   }
   if (!question) return;
   const auto topics = published.value_or(std::map<std::string, std::string>());

@@ -50,8 +50,6 @@ class MasterWatch {
  private:
   void loop();
   void look();
-  bool isStopping();
-  void findDead(AwaitedTopic& topic);
   void lookAtParameters();
 
   const std::vector<std::unique_ptr<MeshSubscription>>& meshes_;

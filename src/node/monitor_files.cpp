@@ -34,9 +34,9 @@ void addGroups(const MeshResource& mesh, const std::string& file, const std::set
 }
 
 /// What of a file was skipped.
-std::string remarksOf(const std::string& file, const MeshResource& mesh) {
+std::string hintsOf(const std::string& file, const MeshResource& mesh) {
   std::string text;
-  for (const std::string& remark : mesh.remarks) text = joined(text, file + ": " + remark);
+  for (const std::string& hint : mesh.hints) text = joined(text, file + ": " + hint);
   return text;
 }
 
@@ -65,7 +65,7 @@ void MonitorPipeline::loadFiles() {
           loadFile(body, "topology/file", "an STL, OBJ or PLY", [&] { return loadTopologyFile(body.topology_file); });
       body.input.file_topology = file.topology;
       body.input.file_dropped_faces = file.dropped_faces;
-      remarks_[b] = remarksOf(body.topology_file, file);
+      file_hints_[b] = hintsOf(body.topology_file, file);
       addGroups(file, body.topology_file, setsNamed(b), body);
       checkGrid(body);
     }
@@ -77,8 +77,8 @@ void MonitorPipeline::loadFiles() {
     const MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
                                        [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     addGroups(mesh, body.mesh_file, setsNamed(b), body);
-    remarks_[b] = remarksOf(body.mesh_file, mesh);
-    hints_[b] = joined(remarks_[b], rigidHint(body.mesh_file, mesh.positions, body.mesh_scale));
+    file_hints_[b] = hintsOf(body.mesh_file, mesh);
+    hints_[b] = joined(file_hints_[b], rigidHint(body.mesh_file, mesh.positions, body.mesh_scale));
     setRigid(b, mesh);
   }
 }

@@ -31,10 +31,10 @@ void MonitorLog::alarm(const std::string& kind, const std::string& text) {
 
 bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
-void MonitorLog::tell(const Outcome& outcome, const std::string& remedy) {
+void MonitorLog::tell(const Outcome& outcome, const std::string& hint) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
   const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
-                           (remedy.empty() ? "" : "; " + remedy);
+                           (hint.empty() ? "" : "; " + hint);
   if (outcome.status != StepStatus::TIME_JUMP) {
     return complain(config_.monitor.clock_body, toString(outcome.status), text);
   }

@@ -27,7 +27,7 @@ class MonitorLog {
   /// Whether lines of this kind, which are not to be lost, may be written now.
   bool isDue(const std::string& kind);
   /// An outcome that is not OK: status, reason, and what to do.
-  void tell(const Outcome& outcome, const std::string& remedy);
+  void tell(const Outcome& outcome, const std::string& hint);
   /// Whether it is time to look into silence again: rarely, and not at once.
   bool isSilenceDue(std::int64_t now_ns);
   /// Logs a hint when it is another one than before. `silence`: why nothing comes, see silenceHint().

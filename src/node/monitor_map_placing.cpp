@@ -39,7 +39,7 @@ bool MonitorPipeline::findPlace(const LoadedMap& loaded, ObstacleMap& map, std::
   std::ostringstream text;
   text << "the octomap is older than all transforms of its frame '" << frame << "': it is placed by the first, "
        << secondsBetween(map.stamp_ns, *first_ns) << " s after its stamp";
-  map_note_ = text.str();
+  map_hint_ = text.str();
   return true;
 }
 

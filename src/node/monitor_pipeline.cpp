@@ -16,7 +16,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
       transforms_(transforms),
       fixed_frame_(config_.fixed_frame) {
   hints_.resize(config_.bodies.size());
-  remarks_.resize(config_.bodies.size());
+  file_hints_.resize(config_.bodies.size());
   loadFiles();
   findSets();
   config_.monitor.detector.expected = config_.expectedIn(config_.phase);
@@ -25,7 +25,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
   placed_.resize(config_.bodies.size());
-  complaints_.resize(config_.bodies.size());
+  problems_.resize(config_.bodies.size());
   refused_.resize(config_.bodies.size());
   checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
@@ -56,7 +56,7 @@ void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns
                            const std::string& reason) {
   const std::string text = shortText(reason);
   monitor_->skip(body, status, stamp_ns, text, arrival_ns);
-  complaints_[body] = "refused: " + text;
+  problems_[body] = "refused: " + text;
 }
 
 void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
@@ -103,9 +103,9 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   }
   refused_[body].clear();
   checked_[body] = waiting.mesh.topology;
-  const bool first_remark = !waiting.mesh.row_step_remark.empty() && wrong_row_steps_++ == 0;
-  if (is_new || first_remark) {
-    hints_[body] = joined(remarks_[body], meshHint(waiting.mesh, config_.bodies[body].input));
+  const bool first_hint = !waiting.mesh.row_step_hint.empty() && wrong_row_steps_++ == 0;
+  if (is_new || first_hint) {
+    hints_[body] = joined(file_hints_[body], meshHint(waiting.mesh, config_.bodies[body].input));
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
@@ -139,7 +139,7 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
     trusted_map_ = std::move(map);
     return;
   }
-  if (!map.note.empty() && map_notes_.insert(map.note).second) map_note_ = map.note;
+  if (!map.hint.empty() && map_hints_.insert(map.hint).second) map_hint_ = map.hint;
   map_slow_ = map.slow;
   unplaced_maps_.push_back({std::move(map), now_ns});
   limitUnplacedMaps();
@@ -172,7 +172,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   }
   statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken());
   if (!map_slow_.empty()) {
-    statement_.remedy = outcome.status == StepStatus::NO_MAP ? map_slow_ : joined(statement_.remedy, map_slow_);
+    statement_.hint = outcome.status == StepStatus::NO_MAP ? map_slow_ : joined(statement_.hint, map_slow_);
   }
   return true;
 }
@@ -250,6 +250,6 @@ std::string MonitorPipeline::onlyPassedOver(std::size_t body) const {
   return "all messages so far, " + std::to_string(others.messages) + ", are passed over: " + others.newest;
 }
 
-std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }
+std::string MonitorPipeline::takeProblem(std::size_t body) { return std::exchange(problems_[body], {}); }
 
 }  // namespace dccd

@@ -13,7 +13,7 @@
 
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
@@ -27,7 +27,7 @@ namespace dccd {
 /// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
 /// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
 struct LoadedMap : ObstacleMap {
-  std::string note;  ///< what looks like a mistake in what it was made of; empty: nothing does
+  std::string hint;  ///< what looks like a mistake in what it was made of; empty: nothing does
   std::string slow;  ///< that its making takes too long, and what to do; empty: it does not
 };
 
@@ -122,13 +122,13 @@ class MonitorPipeline {
   StatsContext counters() const;
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
-  std::string takeComplaint(std::size_t body);
+  std::string takeProblem(std::size_t body);
   /// Of the body's topic: messages of markers that are none of the mesh.
   std::uint64_t passedOver(std::size_t body) const { return passed_over_[body].messages; }
   /// That nothing else came, and what did; empty: something else did, or nothing at all.
   std::string onlyPassedOver(std::size_t body) const;
   /// What was taken for granted to place the map, since the last call; for the log. Empty: nothing was.
-  std::string takeMapNote() { return std::exchange(map_note_, {}); }
+  std::string takeMapHint() { return std::exchange(map_hint_, {}); }
   /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h); empty: nothing
   /// does.
   const std::string& hint(std::size_t body) const { return hints_[body]; }
@@ -138,7 +138,7 @@ class MonitorPipeline {
     DecodedMesh mesh;
     bool overdue = false;  // past transform_timeout_s
     bool kept = false;     // that, or one before it was: a static body sends its only frame once, and steps do not wait
-    bool told = false;     // the complaint about it has been set
+    bool told = false;     // the problem about it has been set
     std::string reason;    // why it has no place yet
   };
   /// What tf carries.
@@ -177,7 +177,7 @@ class MonitorPipeline {
   std::vector<std::string> robot_changed_;
   std::shared_ptr<const std::vector<OwnVoxel>> counted_voxels_;  // of a map: robots_voxels_ are the robot's
   std::size_t robots_voxels_ = 0;
-  std::vector<std::string> complaints_, hints_, remarks_;
+  std::vector<std::string> problems_, hints_, file_hints_;
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   struct UnplacedMap {
@@ -188,8 +188,8 @@ class MonitorPipeline {
   std::optional<LoadedMap> trusted_map_;   // beside live ones
   bool trusted_placed_ = false;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
-  std::string map_note_;                                 // to be told
-  std::set<std::string> map_notes_;   // LoadedMap::note, as far as they were told; there are a few for each source
+  std::string map_hint_;                                 // to be told
+  std::set<std::string> map_hints_;   // LoadedMap::hint, as far as they were told; there are a few for each source
   std::string map_slow_;              // LoadedMap::slow of the newest one
   std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
   std::string map_doubt_;

@@ -81,8 +81,8 @@ void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::st
     // It was lost at the start of the step that ends here.
     if (rigid.lost) frame.seen.push_back(unknownAt(frame.stamp_ns - 1, "no transform of its frame where it begins"));
     rigid.pose = frame.pose;
-  } else if (!rigid.lost && body < complaints_.size()) {
-    complaints_[body] = "not watched meanwhile: " + lost;
+  } else if (!rigid.lost && body < problems_.size()) {
+    problems_[body] = "not watched meanwhile: " + lost;
   }
   rigid.lost = !lost.empty();
   monitor_->countReceived(body);
@@ -139,7 +139,7 @@ void MonitorPipeline::keep(std::size_t body) {
   // Before the clock body's first message there may be no fixed frame, and nothing is wrong.
   if (fixed_frame_.empty() || waiting.told) return;
   waiting.told = true;
-  complaints_[body] = "waits: " + waiting.reason;
+  problems_[body] = "waits: " + waiting.reason;
 }
 
 std::string MonitorPipeline::missing(std::size_t body) const {

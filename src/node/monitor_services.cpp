@@ -2,10 +2,8 @@
 #include "node/collision_monitor_impl.h"
 
 #include <deformable_ccd/AttachObject.h>
-#include <deformable_ccd/DetachObject.h>
-#include <deformable_ccd/RemoveObject.h>
+#include <deformable_ccd/Named.h>
 #include <deformable_ccd/SetHold.h>
-#include <deformable_ccd/SetPhase.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 
@@ -69,8 +67,8 @@ void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
 
 /// What is expected, by the phase of the task and by what hands hold.
 void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
+  using deformable_ccd::Named;
   using deformable_ccd::SetHold;
-  using deformable_ccd::SetPhase;
   const auto ask = [this](const std::function<void()>& set) {
     const auto run = [this, set] {
       try {
@@ -82,8 +80,8 @@ void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
     };
     return queue.call(run, SERVICE_TIMEOUT_S);
   };
-  services.push_back(advertise<SetPhase>(service, "set_phase", [this, ask](const SetPhase::Request& request) {
-    return ask([this, phase = request.phase] { pipeline.setPhase(phase); });
+  services.push_back(advertise<Named>(service, "set_phase", [this, ask](const Named::Request& request) {
+    return ask([this, phase = request.name] { pipeline.setPhase(phase); });
   }));
   services.push_back(advertise<SetHold>(service, "set_hold", [this, ask](const SetHold::Request& request) {
     return ask([this, request] { pipeline.setHold(request.body, request.by, request.holds); });
@@ -92,8 +90,7 @@ void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
 
 void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
   using deformable_ccd::AttachObject;
-  using deformable_ccd::DetachObject;
-  using deformable_ccd::RemoveObject;
+  using deformable_ccd::Named;
   // What is refused is counted, be it on this thread, where meshes are read, or on the worker's.
   const auto ask = [this](const std::string& done, const std::function<std::function<void()>()>& read) {
     Reply reply;
@@ -115,11 +112,11 @@ void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
       };
     });
   }));
-  services.push_back(advertise<DetachObject>(service, "detach", [this, ask](const DetachObject::Request& request) {
+  services.push_back(advertise<Named>(service, "detach", [this, ask](const Named::Request& request) {
     return ask("from the next step on '" + request.name + "' stays where it is",
                [&] { return [this, name = request.name] { pipeline.detach(name); }; });
   }));
-  services.push_back(advertise<RemoveObject>(service, "remove", [this, ask](const RemoveObject::Request& request) {
+  services.push_back(advertise<Named>(service, "remove", [this, ask](const Named::Request& request) {
     return ask("'" + request.name + "' is forgotten",
                [&] { return [this, name = request.name] { pipeline.remove(name); }; });
   }));

@@ -93,14 +93,14 @@ bool CollisionMonitor::Impl::holdsStaticFrames() const {
   return true;
 }
 
-void CollisionMonitor::Impl::tellComplaints() {
+void CollisionMonitor::Impl::tellProblems() {
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    const std::string complaint = pipeline.takeComplaint(b);
+    const std::string problem = pipeline.takeProblem(b);
     // The clock body's come as outcomes, which are logged when they are published.
-    if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", complaint);
+    if (!problem.empty() && b != config.monitor.clock_body) log.complain(b, "message", problem);
   }
-  const std::string note = pipeline.takeMapNote();
-  if (!note.empty()) log.complain(config.bodies.size(), "map", note);
+  const std::string hint = pipeline.takeMapHint();
+  if (!hint.empty()) log.complain(config.bodies.size(), "map", hint);
 }
 
 /// Topics that should have said something. What holds at all times, a static body's or a map's, may be silent once it
@@ -117,12 +117,12 @@ std::vector<AwaitedTopic> CollisionMonitor::Impl::silentTopics() {
     if (frames > 0 && (pipeline.isStatic(b) || secondsBetween(heard[b].at_ns, now_ns) < patience_s)) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
                       config.bodies_listed ? "bodies/" + config.bodies[b].body.name + "/topic" : "mesh:=TOPIC",
-                      frames > 0, ""});
+                      frames > 0});
   }
   const bool may_rest = pipeline.effects().mapSeen() && config.monitor.octomap_timeout_s == 0;
   for (const ros::Subscriber& map : map_subscribers) {
     if (!pipeline.effects().mapExpected() || may_rest) continue;
-    silent.push_back({map.getTopic(), map.getNumPublishers(), "", map_publisher_seen, ""});
+    silent.push_back({map.getTopic(), map.getNumPublishers(), "", map_publisher_seen});
   }
   return silent;
 }
@@ -160,7 +160,7 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
-  log.tell(outcome, pipeline.statement().remedy);
+  log.tell(outcome, pipeline.statement().hint);
   newest_ns = outcome.stamp_ns;
   // Once the state is published, roscpp's thread is awake and takes locks that each question for subscribers waits for:
   // results are ready by then. But a long list is not to keep a clear state standing that is over.
@@ -176,9 +176,6 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
   publishEffects(toRosTime(outcome.stamp_ns));
-  if (pipeline.effects().takeNewLeftOut(pipeline.monitor())) {
-    outputs.publishLeftOut(toLeftOutPairs(pipeline.monitor().leftOut(), bodies, outcome.stamp_ns, frame));
-  }
   predict(outcome);
   if (outputs.wantsStats()) {
     StatsContext context = statsContext();
@@ -285,7 +282,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
     if (!pipeline.isResting()) publishOutcome(outcome);
   }
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
-  tellComplaints();
+  tellProblems();
   const std::string surprise = recorder.takeSurprise();
   if (!surprise.empty()) log.alarm("surprise", surprise);
   bool more = false;

@@ -11,7 +11,7 @@
 #include <deformable_ccd/CollisionMonitorConfig.h>
 #include <dynamic_reconfigure/server.h>
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 
 namespace dccd {
 

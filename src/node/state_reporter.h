@@ -14,7 +14,7 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 #include "node/liveness.h"
 #include "output/output_messages.h"
 #include "output/safe_until_messages.h"

@@ -27,8 +27,7 @@ std::string inFileName(std::string name) {
 }  // namespace
 
 StepRecorder::StepRecorder(const MonitorConfig& config, Monitor& monitor, const std::string& node)
-    : folder_(config.record_folder.empty() ? rosHome() + "/deformable_ccd" : config.record_folder),
-      owner_(inFileName(node)) {
+    : folder_(rosHome() + "/deformable_ccd"), owner_(inFileName(node)) {
   if (config.record_steps == 0) return;
   recorder_ = std::make_unique<FlightRecorder>(config.record_steps, folder_, owner_, recordedMaps(config));
   monitor.setListener(recorder_.get());

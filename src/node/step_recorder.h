@@ -1,4 +1,4 @@
-// The node's flight recorder: parameters record_steps and record_folder, the service ~record_step, and what the log
+// The node's flight recorder: parameter record_steps, the service ~record_step, and what the log
 // says.
 #pragma once
 

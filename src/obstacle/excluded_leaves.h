@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dccd/map_limits.h"
+#include "base/map_limits.h"
 #include "dccd/voxel_surface.h"
 
 namespace dccd {

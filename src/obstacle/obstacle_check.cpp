@@ -6,7 +6,7 @@
 
 #include "obstacle/obstacle_check_impl.h"
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "obstacle/burst.h"
 
 namespace dccd {
@@ -191,7 +191,7 @@ bool ObstacleCheck::run(const ObstacleQuery& query, std::vector<Contact>& contac
                                 std::to_string(topology.vertexCount()));
   }
   Impl& impl = *impl_;
-  const Impl::Run run{query, &query.surface.impl(), &stats};
+  const Impl::Run run{query, &VoxelSurface::Impl::of(query.surface), &stats};
   impl.begin(query.deadline);
   impl.prepareReaches(run);
   if (query.surface.leafCount() > 0 && !impl.isLate(run)) {

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "dccd/next_surface.h"
+#include "base/next_surface.h"
 #include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
@@ -43,9 +43,10 @@ std::shared_ptr<const VoxelSurface> nextSurface(double resolution_m, std::vector
   // Where voxels have another size little is in common, whatever the keys say.
   if (resolution_m != before.resolution()) return VoxelSurface::build(resolution_m, std::move(leaves));
   VoxelTree::Change change;
-  auto tree = VoxelTree::following(leaves, before.impl().tree, change);
+  auto tree = VoxelTree::following(leaves, VoxelSurface::Impl::of(before).tree, change);
   if (!tree) return VoxelSurface::build(resolution_m, std::move(leaves));
-  std::vector<FeatureMask> features = exposedFeatures(*tree, before.impl().tree, before.impl().features, change);
+  std::vector<FeatureMask> features =
+      exposedFeatures(*tree, VoxelSurface::Impl::of(before).tree, VoxelSurface::Impl::of(before).features, change);
   return std::make_shared<const VoxelSurface>(
       std::make_unique<VoxelSurface::Impl>(resolution_m, std::move(*tree), std::move(features)));
 }

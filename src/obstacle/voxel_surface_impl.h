@@ -11,6 +11,8 @@
 namespace dccd {
 
 struct VoxelSurface::Impl {
+  static const Impl& of(const VoxelSurface& surface) { return *surface.impl_; }
+
   Impl(double resolution, VoxelTree of, std::vector<FeatureMask> exposed);
 
   /// Keys of all voxels that a closed range of coordinates [m] may touch, closed voxels: at least these.

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 
 namespace dccd {
 

@@ -1,4 +1,4 @@
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "octomap/depth_picture.h"
 #include "octomap/passed_voxels.h"
 

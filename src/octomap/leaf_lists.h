@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "dccd/octomap_decode.h"
+#include "base/octomap_decode.h"
 #include "obstacle/voxel_bits.h"
 #include "obstacle/voxel_tree.h"
 

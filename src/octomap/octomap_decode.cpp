@@ -2,7 +2,7 @@
 // end of truncated data and takes the sizes that a message claims on trust. Layouts:
 // OccupancyOcTreeBase::readBinaryNode (two bits a child) and OcTreeBaseImpl::readNodesRecurs (value, child bits); tests
 // compare with liboctomap's own.
-#include "dccd/octomap_decode.h"
+#include "base/octomap_decode.h"
 
 #include <cmath>
 #include <cstring>
@@ -11,7 +11,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "dccd/regular_file.h"
+#include "base/regular_file.h"
 #include "dccd/tolerances.h"
 #include "obstacle/resolution.h"
 #include "octomap/leaf_lists.h"

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <sstream>
 
-#include "dccd/decimal.h"
-#include "dccd/octomap_decode.h"
+#include "base/decimal.h"
+#include "base/octomap_decode.h"
 
 namespace dccd {
 namespace {

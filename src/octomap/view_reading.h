@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "octomap/cloud_rays.h"
 #include "octomap/depth_picture.h"
 

@@ -160,8 +160,8 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
         (mesh.unread_lists == 1 ? "marker is" : "markers are") +
         " not read, so that nothing is proved; name the one that is the mesh by marker/namespace and marker/id");
   }
-  add(mesh.camera_remark);
-  add(mesh.row_step_remark);
+  add(mesh.camera_hint);
+  add(mesh.row_step_hint);
   if (mesh.stamp_ns == 0) {
     add("messages carry no stamp, so that the time of receipt stands in for it, with all its jitter; set header.stamp "
         "in the publisher");

@@ -7,7 +7,7 @@
 
 #include <tf2_eigen/tf2_eigen.h>
 
-#include "dccd/new_contacts.h"
+#include "dccd/monitor_extras.h"
 #include "output/marker_drawing.h"
 #include "output/patch_messages.h"
 
@@ -76,7 +76,7 @@ std::string lengthInWords(double m) {
 
 /// The shortest segment between each two partners at the step's end, with its length; where they touch, contacts show.
 void addClearances(MarkerDrawing& drawing) {
-  Marker segments = drawing.make("clearance", Marker::LINE_LIST, 1.5 * drawing.config.line_width_m);
+  Marker segments = drawing.make("clearance", Marker::LINE_LIST, 1.5 * drawing.config.lineWidth());
   int id = 0;
   for (const Clearance& clearance : drawing.outcome.clearances) {
     ++id;
@@ -114,7 +114,7 @@ void addBeginnings(MarkerDrawing& drawing) {
 /// Of each patch, or where there are none of each contact that is new.
 void addNormal(const MarkerDrawing& drawing, const std::array<std::uint16_t, 2>& body, const Vec3& at,
                const Vec3& normal, Marker& normals) {
-  const Vec3 length = drawing.config.normal_length_m * normal;
+  const Vec3 length = drawing.config.normalLength() * normal;
   // Of a body against itself neither side is the first one: both ways.
   normals.points.push_back(point(body[0] == body[1] ? Vec3(at - length) : at));
   normals.points.push_back(point(at + length));
@@ -194,9 +194,9 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
   Marker contacts = drawing.make("contacts", Marker::SPHERE_LIST, config.point_size_m);
   Marker initial = drawing.make("initial", Marker::SPHERE_LIST, config.point_size_m);
   Marker expected = drawing.make("expected", Marker::SPHERE_LIST, config.point_size_m);
-  Marker normals = drawing.make("normals", Marker::LINE_LIST, 2 * config.line_width_m);
+  Marker normals = drawing.make("normals", Marker::LINE_LIST, 2 * config.lineWidth());
   Marker faces = drawing.make("faces", Marker::TRIANGLE_LIST, 1);
-  Marker voxels = drawing.makeInMap("voxels", Marker::LINE_LIST, 1.5 * config.line_width_m);
+  Marker voxels = drawing.makeInMap("voxels", Marker::LINE_LIST, 1.5 * config.lineWidth());
   initial.color = INITIAL;
   expected.color = EXPECTED;
   normals.color = NORMAL;

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "dccd/contact_fields.h"
-#include "dccd/contact_geometries.h"
-#include "dccd/new_contacts.h"
+#include "base/contact_fields.h"
+#include "base/contact_geometries.h"
+#include "dccd/monitor_extras.h"
 #include "output/clearance_messages.h"
 #include "output/patch_messages.h"
 
@@ -75,7 +75,6 @@ void fillCounts(const Outcome& outcome, StatsMessage& out) {
   out.contacts_mesh = static_cast<std::uint32_t>(outcome.counts.mesh);
   out.contacts_obstacle = static_cast<std::uint32_t>(outcome.counts.obstacle);
   out.contacts_expected = static_cast<std::uint32_t>(outcome.counts.expected);
-  out.suppressed = static_cast<std::uint32_t>(outcome.suppressed);
   out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
   out.earliest_toc = plottable(outcome.earliest_toc);
 }
@@ -169,7 +168,6 @@ const deformable_ccd::ContactArray& fillContactArray(const Outcome& outcome, con
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
-  out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
   out.bodies.clear();
   for (const Body& body : bodies) out.bodies.push_back(body.name);
   resizeKept(out.contacts, outcome.contacts.size());
@@ -254,7 +252,7 @@ void fillState(const Statement& statement, deformable_ccd::State& message) {
   message.touching = static_cast<std::uint8_t>(assurance.touching);
   message.clear = assurance.clear();
   message.reason = describe(assurance, statement.touches);
-  if (!assurance.proved && !statement.remedy.empty()) message.reason += "; " + statement.remedy;
+  if (!assurance.proved && !statement.hint.empty()) message.reason += "; " + statement.hint;
   // Where it was left out by choice, or is missing, that is said already.
   const bool is_news = assurance.proved && !message.checked_map && !message.holds_until.isZero();
   const auto tells = [](const std::string& sentence) { return sentence.find("octomap") != std::string::npos; };
@@ -292,22 +290,7 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.maps_dropped = context.maps_dropped;
   out.clouds_only_filled = context.clouds_only_filled;
   out.points_no_measurement = context.points_no_measurement;
-  out.markers_built = context.markers_built;
   out.parameter_hash = context.parameter_hash;
-  return out;
-}
-
-deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,
-                                            StampNs stamp_ns, const std::string& frame) {
-  deformable_ccd::LeftOutPairs out;
-  out.header = headerOf(stamp_ns, frame);
-  for (const Body& body : bodies) out.bodies.push_back(body.name);
-  out.pairs.resize(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    out.pairs[i].kind = static_cast<std::uint8_t>(pairs[i].kind);
-    out.pairs[i].body = pairs[i].body;
-    std::copy(pairs[i].vertex.begin(), pairs[i].vertex.end(), out.pairs[i].vertex.begin());
-  }
   return out;
 }
 

@@ -7,13 +7,12 @@
 #include <deformable_ccd/Contact.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/FirstContact.h>
-#include <deformable_ccd/LeftOutPairs.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
 #include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
 #include "output/statement.h"
 #include "report/words.h"
@@ -67,7 +66,6 @@ struct StatsContext {
   std::uint64_t wrong_row_steps = 0;      ///< clouds of which the data say it
   std::uint64_t markers_passed_over = 0;  ///< messages of markers that are none of the mesh
   std::uint64_t frames_handed_over = 0;   ///< by publishers in the same process, never serialised
-  std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;
   PromiseCounts promises;  ///< of ~safe_until, since the start
 };
@@ -86,8 +84,6 @@ void fillState(const Statement& statement, deformable_ccd::State& message);
 double mapAge(const Outcome& outcome);
 /// The message of the package, not StepStats.
 deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
-deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,
-                                            StampNs stamp_ns, const std::string& frame);
 /// From a prediction (Monitor::predict) over horizon_s.
 deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
                                               const std::vector<Body>& bodies, const std::string& frame);

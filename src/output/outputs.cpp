@@ -32,7 +32,6 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
     clearance_ = node.advertise<deformable_ccd::ClearanceArray>("clearance", TOPIC_QUEUE);
   }
   if (config.promises()) safe_until_ = node.advertise<deformable_ccd::SafeUntil>("safe_until", TOPIC_QUEUE, true);
-  if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
 std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vector<Body>& bodies,
@@ -62,14 +61,11 @@ std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vec
 
 void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
                              const std::string& frame) {
-  if (markers_.getNumSubscribers() > 0 && !frame.empty()) {
-    ++markers_built_;
-    markers_.publish(toMarkers(outcome, bodies, markers, frame));
-  }
+  if (markers_.getNumSubscribers() == 0 || frame.empty()) return;
+  markers_.publish(toMarkers(outcome, bodies, markers, frame));
 }
 
-void Outputs::publishStats(const Outcome& outcome, StatsContext context, const std::string& frame) {
-  context.markers_built = markers_built_;
+void Outputs::publishStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
   stats_.publish(toStepStats(outcome, context, frame));
 }
 
@@ -97,10 +93,6 @@ void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, con
 void Outputs::publishSafeUntil(const deformable_ccd::SafeUntil& message) { safe_until_.publish(message); }
 
 void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }
-
-void Outputs::publishLeftOut(const deformable_ccd::LeftOutPairs& pairs) {
-  if (left_out_) left_out_.publish(pairs);
-}
 
 void Outputs::publishNothing(const std::string& frame) {
   // Of an outcome without an answer all that is shown is that what was there before is gone.

@@ -28,7 +28,7 @@ class Outputs {
   void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
                       const std::string& frame);
   /// After the step's prediction, which it tells of.
-  void publishStats(const Outcome& outcome, StatsContext context, const std::string& frame);
+  void publishStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
   /// Whether anybody listens to statistics.
   bool wantsStats() const;
   /// Whether anybody listens to predictions.
@@ -42,15 +42,13 @@ class Outputs {
   void publishSafeUntil(const deformable_ccd::SafeUntil& message);
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.
-  void publishLeftOut(const deformable_ccd::LeftOutPairs& pairs);
   /// Nothing is shown any more: after a reset or when disabled. An empty frame: nothing was shown yet.
   void publishNothing(const std::string& frame);
 
  private:
-  ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_,
-      patches_, events_, clearance_, safe_until_;
+  ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, predicted_, time_to_contact_, patches_, events_,
+      clearance_, safe_until_;
   deformable_ccd::ContactArray list_;  // each is made in the memory of the one before
-  std::uint64_t markers_built_ = 0;
 };
 
 }  // namespace dccd

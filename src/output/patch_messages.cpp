@@ -2,8 +2,8 @@
 
 #include <set>
 
-#include "dccd/contact_fields.h"
-#include "dccd/new_contacts.h"
+#include "base/contact_fields.h"
+#include "dccd/monitor_extras.h"
 #include "output/output_messages.h"
 
 namespace dccd {

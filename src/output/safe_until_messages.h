@@ -7,7 +7,7 @@
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
 
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 
 namespace dccd {
 

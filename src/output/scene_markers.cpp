@@ -150,32 +150,18 @@ Positions grown(const Topology& topology, const Positions& at, double by_m) {
   return out;
 }
 
-/// Of rigid bodies: what must not come nearer than their separation, roughly, and the box of all that they sweep.
-void addSwept(MarkerDrawing& drawing) {
+/// Of rigid bodies: what must not come nearer than their separation, roughly.
+void addPadding(MarkerDrawing& drawing) {
   for (const Body& body : drawing.outcome.step->bodies) {
-    Box box;
-    for (const Positions* at : {body.t0.get(), body.t1.get()}) {
-      for (const Vec3& p : *at) {
-        box.min = box.min.cwiseMin(p);
-        box.max = box.max.cwiseMax(p);
-      }
+    const bool placed = std::all_of(body.t1->begin(), body.t1->end(), [](const Vec3& p) { return p.allFinite(); });
+    if (!body.rigid || !placed || !(body.minimum_separation_m > 0)) continue;
+    Marker padding = drawing.make("padding/" + body.name, Marker::TRIANGLE_LIST, 1.0);
+    padding.color = color(1, 0.7, 0.2, 0.25);
+    const Positions at = grown(*body.topology, *body.t1, body.minimum_separation_m);
+    for (const Face& face : body.topology->faces()) {
+      for (const Index v : face) padding.points.push_back(point(at[v]));
     }
-    if (!body.rigid || box.empty() || !box.min.allFinite() || !box.max.allFinite()) continue;
-    const double separation_m = body.minimum_separation_m;
-    if (separation_m > 0) {
-      Marker padding = drawing.make("padding/" + body.name, Marker::TRIANGLE_LIST, 1.0);
-      padding.color = color(1, 0.7, 0.2, 0.25);
-      const Positions at = grown(*body.topology, *body.t1, separation_m);
-      for (const Face& face : body.topology->faces()) {
-        for (const Index v : face) padding.points.push_back(point(at[v]));
-      }
-      drawing.add(std::move(padding));
-    }
-    Marker edges = drawing.make("swept/" + body.name, Marker::LINE_LIST, drawing.config.line_width_m);
-    edges.color = color(0.5, 0.7, 1);
-    const Vec3 min = box.min - Vec3::Constant(separation_m);
-    addEdges(min, box.max + Vec3::Constant(separation_m) - min, edges);
-    drawing.add(std::move(edges));
+    drawing.add(std::move(padding));
   }
 }
 
@@ -184,8 +170,9 @@ void addSwept(MarkerDrawing& drawing) {
 void addScene(MarkerDrawing& drawing) {
   addObstacle(drawing);
   addOwn(drawing);
-  if (drawing.config.swept) addSwept(drawing);
-  if (drawing.config.mesh) addMeshes(drawing);
+  if (!drawing.config.mesh) return;
+  addMeshes(drawing);
+  addPadding(drawing);
 }
 
 }  // namespace dccd

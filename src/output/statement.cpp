@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <map>
 
-#include "dccd/contact_fields.h"
+#include "base/contact_fields.h"
 #include "output/advice.h"
 #include "output/patch_messages.h"
 
@@ -69,7 +69,6 @@ std::string besides(const Outcome& outcome) {
   const std::size_t lasting = lastingPatches(outcome);
   if (lasting > 0) text += std::to_string(lasting) + (lasting == 1 ? " patch lasts, " : " patches last, ");
   if (outcome.counts.expected > 0) text += std::to_string(outcome.counts.expected) + " expected ones, ";
-  if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
   return text;
 }
 

@@ -12,7 +12,7 @@ namespace dccd {
 struct Statement {
   Assurance assurance;
   std::string touches;  ///< who touches whom, since when and where; empty where nothing does, and without patches
-  std::string remedy;   ///< what to do about what is not proved, see adviceFor(); may be empty
+  std::string hint;     ///< what to do about what is not proved, see adviceFor(); may be empty
   std::string broken;   ///< why the promise before this answer was void, see PromiseWatch::broken(); empty: it was not
 };
 

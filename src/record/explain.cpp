@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "obstacle/excluded_leaves.h"
 #include "obstacle/mesh_keys.h"
 #include "simd/float_mode.h"
@@ -234,8 +234,8 @@ class Explanation {
   void tellPair() {
     const ScopedFloatMode mode;
     History history;
-    history.impl().prepare(step_, options_);
-    forEachPart([&](const Step& part) { tellPart(part, history.impl()); });
+    History::Impl::of(history).prepare(step_, options_);
+    forEachPart([&](const Step& part) { tellPart(part, History::Impl::of(history)); });
   }
 
   /// Each filter, and the rung, is asked about the pair alone, whatever the one before said.

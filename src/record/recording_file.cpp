@@ -8,7 +8,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "dccd/regular_file.h"
+#include "base/regular_file.h"
 #include "record/step_recording.h"
 
 namespace dccd {

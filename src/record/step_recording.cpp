@@ -6,8 +6,8 @@
 #include <tuple>
 #include <type_traits>
 
-#include "dccd/accuracy.h"
-#include "dccd/contact_fields.h"
+#include "base/accuracy.h"
+#include "base/contact_fields.h"
 #include "record/recording_archive.h"
 #include "step/option_rows.h"
 
@@ -63,7 +63,6 @@ template <typename T>
 constexpr bool IS_VECTOR<std::vector<T>> = true;
 
 /// What a byte of the file may be at most.
-constexpr BroadPhase lastOf(BroadPhase) { return BroadPhase::BRUTE_FORCE; }
 constexpr PairKind lastOf(PairKind) { return PairKind::FACE_VOXEL_CORNER; }
 constexpr Certainty lastOf(Certainty) { return Certainty::UNDECIDED; }
 constexpr BodyMotionKind lastOf(BodyMotionKind) { return BodyMotionKind::STATIC; }

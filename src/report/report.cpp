@@ -6,8 +6,8 @@
 #include <limits>
 #include <tuple>
 
+#include "base/contact_fields.h"
 #include "dccd/assurance.h"
-#include "dccd/contact_fields.h"
 #include "report/words.h"
 
 namespace dccd {
@@ -217,7 +217,7 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
 void Report::addProof(const Outcome& o) {
   ++frames_;
   if (o.answered && o.total_contacts == 0 && o.touching != Touching::NONE) {
-    ++lasting_[o.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(o.start_state)];
+    ++lasting_[std::string("start ") + toString(o.start_state)];
   }
   const Assurance assurance = assuranceOf(o);
   first_frames_ += o.status == StepStatus::FIRST_FRAME;

@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "dccd/effect_plan.h"
+#include "base/effect_plan.h"
 #include "dccd/stream.h"
 #include "report/clearance_table.h"
 #include "report/lanes.h"

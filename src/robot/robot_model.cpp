@@ -72,7 +72,7 @@ class RobotMaker {
     for (const auto& link : urdf.model->links_) {
       if (!isLeftOut(link.first)) addLink(*link.second, urdf.refused[link.first]);
     }
-    remarkOnSurfaces(urdf);
+    hintAtSurfaces(urdf);
     return std::move(robot_);
   }
 
@@ -88,14 +88,14 @@ class RobotMaker {
   }
 
   void miss(const std::string& sentence) { robot_.missing.push_back(shortText(sentence)); }
-  void remark(const std::string& sentence) { robot_.remarks.push_back(shortText(sentence)); }
+  void hint(const std::string& sentence) { robot_.hints.push_back(shortText(sentence)); }
 
   void readSemantic(const RobotText& semantic, const urdf::ModelInterface& model) {
     try {
       SrdfText srdf = parseSrdf(given(semantic), model);
       robot_.groups = std::move(srdf.groups);
       robot_.never_meet = std::move(srdf.never_meet);
-      for (const std::string& sentence : srdf.remarks) remark(semantic.name + ": " + sentence);
+      for (const std::string& sentence : srdf.hints) hint(semantic.name + ": " + sentence);
       robot_.semantic_known = true;
     } catch (const RobotTextError& error) {
       miss("no group of the robot is known: " + semantic.name + " " + error.what());
@@ -154,8 +154,8 @@ class RobotMaker {
       bounds.extend(p);
     }
     if (bounds.diagonal().norm() > LARGE_LINK_M) {
-      remark(what + " is " + shown(bounds.diagonal().norm()) +
-             " m across: if its mesh is in millimetres, write scale=\"0.001 0.001 0.001\" beside its filename");
+      hint(what + " is " + shown(bounds.diagonal().norm()) +
+           " m across: if its mesh is in millimetres, write scale=\"0.001 0.001 0.001\" beside its filename");
     }
     return mesh;
   }
@@ -175,8 +175,8 @@ class RobotMaker {
       throw std::invalid_argument("its geometry is no box, cylinder, sphere or mesh");
     }
     if (shape.outside_m > 1.001 * tolerance_m) {
-      remark(what + ": the mesh of its round primitive reaches up to " + shown(shape.outside_m) +
-             " m out of it; for less it would take too many triangles");
+      hint(what + ": the mesh of its round primitive reaches up to " + shown(shape.outside_m) +
+           " m out of it; for less it would take too many triangles");
     }
     MeshResource mesh;
     mesh.topology = share(Topology::fromTriangles(shape.positions.size(), shape.faces));
@@ -191,7 +191,7 @@ class RobotMaker {
       throw std::invalid_argument("the scale of its mesh " + file.filename + " is 0 or not finite along an axis");
     }
     MeshResource mesh = loadMeshResource(file.filename, 1);
-    for (const std::string& sentence : mesh.remarks) remark(what + ": " + file.filename + ": " + sentence);
+    for (const std::string& sentence : mesh.hints) hint(what + ": " + file.filename + ": " + sentence);
     for (Vec3& p : mesh.positions) p = scale.cwiseProduct(p);
     if (scale.prod() > 0) return mesh;
     std::vector<Face> faces = mesh.topology->faces();
@@ -204,7 +204,7 @@ class RobotMaker {
     return text + (text.empty() ? "'" : ", '") + name + "'";
   }
 
-  void remarkOnSurfaces(const UrdfText& urdf) {
+  void hintAtSurfaces(const UrdfText& urdf) {
     std::string visual_only, bare;
     for (const std::string& link : bare_) {
       std::string& list = urdf.visual_only.count(link) > 0 ? visual_only : bare;
@@ -212,10 +212,10 @@ class RobotMaker {
     }
     if (!visual_only.empty()) {
       const std::string why = "they have a visual but no collision element (robot/visuals: true takes the visual)";
-      remark("not watched, for " + why + ": links " + visual_only);
+      hint("not watched, for " + why + ": links " + visual_only);
       robot_.excluded.push_back("links " + visual_only + ": " + why);
     }
-    if (!bare.empty()) remark("without geometry are links " + bare);
+    if (!bare.empty()) hint("without geometry are links " + bare);
     if (robot_.parts.empty() && robot_.missing.empty()) miss("the robot has no link with a collision element");
   }
 };

@@ -65,8 +65,8 @@ class SrdfReader {
   }
 
   void leaveOut(const XMLElement& element, const std::string& what, const std::string& name) {
-    srdf_.remarks.push_back(placeOf(element) + " names the " + what + " '" + name +
-                            "', which the robot does not have; it is left out");
+    srdf_.hints.push_back(placeOf(element) + " names the " + what + " '" + name +
+                          "', which the robot does not have; it is left out");
   }
 
   bool isLink(const std::string& name, const XMLElement& element) {

@@ -15,7 +15,7 @@ struct SrdfText {
   std::map<std::string, std::vector<std::string>> groups;
   /// By disable_collisions and disable_default_collisions, without those of enable_collisions; each once, in order.
   std::vector<std::pair<std::string, std::string>> never_meet;
-  std::vector<std::string> remarks;  ///< on what names a link or joint that the robot has not, and is left out
+  std::vector<std::string> hints;  ///< on what names a link or joint that the robot has not, and is left out
 };
 
 /// A group holds the links that it names, those of its chains as MoveIt has them (from the link after the base to the

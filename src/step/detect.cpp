@@ -54,7 +54,7 @@ std::size_t countParts(const Step& step, const Options& options, const SceneArra
 
 Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline) {
   const ScopedFloatMode mode;  // of all that follows on this thread; turning bodies are cut into parts with it, too
-  return history.impl().run(step, options, deadline);
+  return History::Impl::of(history).run(step, options, deadline);
 }
 
 Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline deadline) {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "dccd/body.h"
-#include "dccd/expectation.h"
 #include "dccd/outcome.h"
+#include "dccd/step.h"
 
 namespace dccd {
 

@@ -78,6 +78,8 @@ struct DCCD_HIDDEN Part {
 };
 
 struct History::Impl {
+  static Impl& of(History& history) { return *history.impl_; }
+
   Outcome run(const Step& step, const Options& wanted, Deadline deadline);
   /// What run() begins with.
   void prepare(const Step& step, const Options& wanted);

@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "step/conclude.h"
 #include "step/expected_contacts.h"
 #include "step/option_rows.h"

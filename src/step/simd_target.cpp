@@ -1,4 +1,4 @@
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 
 #include <stdexcept>
 

@@ -287,7 +287,7 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   const auto start = Deadline::Clock::now();
   try {
     tracker.expect(options.detector.expected);
-    tracker.follow(history.impl().patches, options.patch_gap_s, outcome);
+    tracker.follow(History::Impl::of(history).patches, options.patch_gap_s, outcome);
   } catch (...) {
     tracker.forget(outcome);
     throw;

@@ -23,6 +23,8 @@ namespace dccd {
 void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body);
 
 struct Monitor::Impl {
+  static Impl& of(Monitor& monitor) { return *monitor.impl_; }
+
   /// A frame of the clock body on its way to an outcome: a step from `from` to `to`, or a status without one.
   struct Pending {
     StepStatus status = StepStatus::OK;

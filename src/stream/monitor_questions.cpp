@@ -42,7 +42,7 @@ Outcome Monitor::checkNow() {
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
   Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, Deadline().orWhen(m.cancelled));
-  if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
+  if (m.options.detector.patches) m.tracker.recognise(History::Impl::of(m.side_history).patches, outcome);
   return outcome;
 }
 
@@ -81,7 +81,7 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, deadline);
-  if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
+  if (m.options.detector.patches) m.tracker.recognise(History::Impl::of(m.side_history).patches, outcome);
   return outcome;
 }
 

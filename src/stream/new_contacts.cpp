@@ -1,4 +1,4 @@
-#include "dccd/new_contacts.h"
+#include "dccd/monitor_extras.h"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "dccd/next_surface.h"
+#include "base/next_surface.h"
 #include "dccd/tolerances.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
@@ -65,7 +65,7 @@ KeyBox reachedKeys(const ObstacleMap& map, const std::vector<TrackedBody>& bodie
   }
   if (all.isEmpty()) return {};
   const Vec3 lo = all.min(), hi = all.max();
-  return map.surface->impl().keysOf(lo.data(), hi.data());
+  return VoxelSurface::Impl::of(*map.surface).keysOf(lo.data(), hi.data());
 }
 
 std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
@@ -155,7 +155,8 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const ObstacleMap& map, cons
     cubes.push_back({leaf, why, leafBox(leaf, surface.resolution()), -1});
   };
   const VoxelTree nothing{std::vector<OccupiedLeaf>()}, remembered(remembered_), own = treeOf(own_);
-  const VoxelTree &now = surface.impl().tree, &before = before_ ? before_->impl().tree : nothing;
+  const VoxelTree &now = VoxelSurface::Impl::of(surface).tree,
+                  &before = before_ ? VoxelSurface::Impl::of(*before_).tree : nothing;
   auto appeared = [&](const OccupiedLeaf& voxel) {
     if (cubes.size() < tolerance::MOST_OWN_ASKED) ask(voxel, ReachedCube::Why::APPEARED);
   };
@@ -184,7 +185,8 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const ObstacleMap& map, cons
     if (!meets(voxel, region) || cubes.size() >= most) return seen_.push_back(voxel);
     ask(voxel, ReachedCube::Why::SEEN);
   };
-  for (const OccupiedLeaf& leaf : map.own.doubted_surface->impl().tree.leaves()) visitUncovered(sure, leaf, askSeen);
+  for (const OccupiedLeaf& leaf : VoxelSurface::Impl::of(*map.own.doubted_surface).tree.leaves())
+    visitUncovered(sure, leaf, askSeen);
   return cubes;
 }
 
@@ -234,7 +236,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   const bool is_other = before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id);
   if (is_other || remembered_.size() > MOST_REMEMBERED) forget();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
-  const VoxelTree& sure = trusted ? trusted->impl().tree : nothing;
+  const VoxelTree& sure = trusted ? VoxelSurface::Impl::of(*trusted).tree : nothing;
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
   std::vector<ReachedCube> cubes = cubesToAsk(map, sure, reachedKeys(map, bodies, ways));
   searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes, &shapes_);
@@ -268,7 +270,7 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
                                        const std::vector<TrackedBody>& bodies, bool trust_first) {
   const double resolution_m = map.surface->resolution();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
-  const VoxelTree& sure = trusted ? trusted->impl().tree : nothing;
+  const VoxelTree& sure = trusted ? VoxelSurface::Impl::of(*trusted).tree : nothing;
   std::vector<OwnVoxel> voxels;
   for (const auto& one : own_) voxels.push_back(one.second);
   std::sort(voxels.begin(), voxels.end(), [](const OwnVoxel& a, const OwnVoxel& b) { return a.key < b.key; });
@@ -287,8 +289,9 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
     }
     const auto last = reduced_.lock();
     const std::shared_ptr<const VoxelSurface> given = map.surface;
-    map.surface = nextSurface(resolution_m, leavesWithout(given->impl().tree, VoxelTree(without), sure.leaves()),
-                              last ? *last : *given);
+    map.surface =
+        nextSurface(resolution_m, leavesWithout(VoxelSurface::Impl::of(*given).tree, VoxelTree(without), sure.leaves()),
+                    last ? *last : *given);
   }
   reduced_ = map.surface;
   return map;

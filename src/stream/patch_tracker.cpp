@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "dccd/new_contacts.h"
+#include "dccd/monitor_extras.h"
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 

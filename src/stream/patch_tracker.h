@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "dccd/expectation.h"
 #include "dccd/outcome.h"
+#include "dccd/step.h"
 #include "step/patches/patches.h"
 
 namespace dccd {

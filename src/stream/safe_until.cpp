@@ -1,4 +1,4 @@
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 
 #include <gmpxx.h>
 
@@ -235,7 +235,9 @@ StampNs nsIn(double seconds) {
 /// Whether something is occupied that was not before.
 bool hasNewVoxels(const VoxelSurface& now, const VoxelSurface& before) {
   bool found = now.resolution() != before.resolution();
-  if (!found) visitDifference(now.impl().tree, before.impl().tree, [&](const OccupiedLeaf&) { found = true; });
+  if (!found)
+    visitDifference(VoxelSurface::Impl::of(now).tree, VoxelSurface::Impl::of(before).tree,
+                    [&](const OccupiedLeaf&) { found = true; });
   return found;
 }
 

@@ -101,7 +101,7 @@ class AddressSpaceTest(AttackTest):
         self.lives(self.publisher, 1000)
 
     def test_a_tracker_that_collapses(self):
-        self.start('space_collapsed', max_compute_s=5.0)
+        self.start('space_collapsed', step_budget_ms=5000.0)
         self.outcomes_of(self.publisher, [flat_cloud(2, 30, 30), cloud_of(3, [(0.1, 0.1, 0.1)] * 900, 30, 30)])
         self.lives(self.publisher, 100)
 

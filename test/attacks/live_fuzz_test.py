@@ -39,13 +39,13 @@ ANSWER_S = 60  # for an answer of a node that is not stuck, on a machine that is
 class LiveFuzzTest(AttackTest):
     def parameters(self):
         r = self.source.random
-        chosen = {'max_memory_mb': LIMIT_MB, 'max_map_mb': LIMIT_MB, 'record_folder': self.folder, 'record_steps': r.choice([0, 1, 20]),
+        chosen = {'max_memory_mb': LIMIT_MB, 'max_map_mb': LIMIT_MB, 'record_steps': r.choice([0, 1, 20]),
                   'num_threads': r.choice([1, 2]), 'queue_policy': r.choice(['newest', 'oldest']), 'queue_size': r.choice([1, 8, 50]),
                   'effects/octomap': r.choice(['on', 'on', 'off']), 'octomap_topic': '/fuzz_map', 'look_ahead_s': r.choice([0.0, 0.1]),
                   'markers/mesh': r.choice(['true', 'false']), 'markers/obstacle_m': r.choice([0.0, 0.5]),
                   'fixed_frame': r.choice(['world', '']), 'transform_timeout_s': r.choice([0.0, 0.1]),
-                  'step_budget_ms': r.choice([0.0, 0.0, 5.0]), 'max_compute_s': 0.2, 'uncertainty/radius_m': r.choice([0.0, 0.0, 0.001]),
-                  'unknown_space': r.choice(['free', 'free', 'occupied']), 'weld': r.choice(['on', 'off'])}
+                  'step_budget_ms': r.choice([200.0, 200.0, 5.0]), 'uncertainty/radius_m': r.choice([0.0, 0.0, 0.001]),
+                  'unknown_space': r.choice(['free', 'free', 'occupied'])}
         self.lists = {'unknown_box': [-1, -1, -1, 1, 1, 1]}
         if r.random() < 0.4:
             self.lists['exclude_boxes'] = [[-0.5, -0.5, -0.5, 0.5003, 0.5, 0.5]]
@@ -59,7 +59,7 @@ class LiveFuzzTest(AttackTest):
         for key, value in self.lists.items():
             rospy.set_param('/%s/%s' % (self.name, key), value)
         self.kind = None
-        self.node = self.start_node(self.name, publishes=False, **parameters)
+        self.node = self.start_node(self.name, process={'env': {**os.environ, 'ROS_HOME': str(self.folder)}}, publishes=False, **parameters)
         self.watch = NodeWatch(parameters['effects/octomap'] == 'on')
         self.subscribers = [rospy.Subscriber('/%s/%s' % (self.name, topic), kind, into) for topic, kind, into in (
             ('contacts', ContactArray, self.watch.contacts), ('stats', StepStats, self.watch.counts), ('state', State, self.watch.state),

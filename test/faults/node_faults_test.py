@@ -1,5 +1,6 @@
 """What happens to processes around the node: overload, a subscriber that never reads, SIGTERM in mid-step, a master that
 goes away, a publisher that is killed, a clock that jumps, a disk that is full. Each test starts a node of its own."""
+import os
 import pathlib
 import signal
 import socket
@@ -165,9 +166,9 @@ class NodeFaultsTest(LiveNodeTest):
         self.assert_adds_up(self.stats[-1])
 
     def test_a_full_disk_while_recording(self):
-        folder = pathlib.Path(self.folder) / 'recordings'
+        folder = pathlib.Path(self.folder) / 'deformable_ccd'
         folder.mkdir()
-        self.start_node('full', record_steps=1, record_folder=folder)
+        self.start_node('full', process={'env': {**os.environ, 'ROS_HOME': str(self.folder)}}, record_steps=1)
         cloud = Cloud(4, 4)
         for _ in range(2):
             self.step(cloud.message())

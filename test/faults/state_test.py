@@ -93,7 +93,7 @@ class StateTest(LiveNodeTest):
         stream.end()
         last = 100 + stream.cloud.count / stream.rate
         self.wait_missing('no frame has come')
-        self.wait_reason('/silent/mesh has fallen silent, though its publisher lives (see rostopic hz)')
+        self.wait_reason('/silent/mesh has fallen silent (see rostopic hz and rosnode ping)')
         late = self.late_subscriber('silent')
         self.assertFalse(late.proved)
         self.assertAlmostEqual(late.holds_until.to_sec(), last, 6)
@@ -106,7 +106,7 @@ class StateTest(LiveNodeTest):
         self.assert_consistent()
 
     def test_steps_that_take_longer_than_frames_come(self):
-        self.start_node('slow', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
+        self.start_node('slow', step_budget_ms=1e6, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(220, 220)
         # Of two frames at once, the node's queue of one may drop the first before it is taken: then there is no step.
         self.publisher.publish(cloud.message())
@@ -136,7 +136,7 @@ class StateTest(LiveNodeTest):
         self.assert_consistent()
 
     def test_a_step_without_a_budget_is_cut(self):
-        self.start_node('cut', max_compute_s=0.02, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6)
+        self.start_node('cut', step_budget_ms=20.0, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6)
         cloud = Cloud(220, 220)
         for _ in range(2):
             self.publisher.publish(cloud.message())
@@ -145,7 +145,7 @@ class StateTest(LiveNodeTest):
         self.wait_missing('the time that a step may take without a budget ran out')
 
     def test_a_reset_while_a_step_is_computed(self):
-        self.start_node('reset', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
+        self.start_node('reset', step_budget_ms=1e6, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(330, 330)  # a step that takes longer than it takes to ask
         rospy.wait_for_service('/reset/reset', 10)
         reset = rospy.ServiceProxy('/reset/reset', Trigger, persistent=True)

@@ -6,8 +6,8 @@ from checkout import CHECKOUT, code_under, tracked_files
 
 ROWS = CHECKOUT / 'src/input/message_types'
 # These write messages for others to read: the recorder of scenes, the bag of results, and what RViz shows.
-WRITERS = {'src/apps/analyze_bag/result_bag.cpp', 'src/apps/make_scene_bag/messages.cpp',
-           'src/apps/make_scene_bag/messages.h', 'src/output/marker_drawing.h',
+WRITERS = {'src/apps/analyze_bag/result_bag.cpp', 'scenes/messages.cpp',
+           'scenes/messages.h', 'src/output/marker_drawing.h',
            'src/output/markers.cpp', 'src/output/markers.h', 'src/output/outputs.cpp', 'src/output/scene_markers.cpp'}
 # This one knows the types that make the map, a cloud among them.
 MAPS = {'src/input/known_types.cpp'}

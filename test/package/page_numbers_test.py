@@ -50,8 +50,6 @@ NUMBERS = {
         (r'not all alike takes (\d+)\.', lambda: tolerance('MAP_NODE_BUILDING') + 2 * tolerance('MAP_NODE')),
         (r'After (\d+) s the answer is', lambda: constant('src/node/monitor_services.cpp', 'SERVICE_TIMEOUT_S')),
         (r'Files of version (\d+) are written and read', lambda: constant('src/record/step_recording.h', 'RECORDING_VERSION')),
-        (r'of `exact`: (\d+) to \d+', lambda: constant('src/config/monitor_config.cpp', 'toc_bits', r'"%s", [^,]+, (\d+), \d+\)')),
-        (r'of `exact`: \d+ to (\d+)', lambda: constant('src/config/monitor_config.cpp', 'toc_bits', r'"%s", [^,]+, \d+, (\d+)\)')),
         (r'`DCCD_API_VERSION` \((\d+)\)', lambda: constant('include/dccd/export.h', 'DCCD_API_VERSION', r'define %s (\d+)')),
         (r'for `hold_s` \(([\d.]+)\)', lambda: constant('examples/stop_the_arm.py', 'hold_s', r'\b%s=([\d.]+)')),
     ],
@@ -76,7 +74,6 @@ NUMBERS = {
     ],
     'doc/development.md': [
         (r'`sync_timeout_s` and (\d+) steps', lambda: constant('include/dccd/stream.h', 'max_waiting')),
-        (r'1 s or (\d+) messages', lambda: constant('src/input/mesh_subscription.cpp', 'SUBSCRIBER_QUEUE')),
     ],
     'doc/fleet.md': [
         (r'job may take ([\d,]+) MB', lambda: fleet('mem-mb')),

@@ -186,6 +186,11 @@ class MakeSceneBagTest(FolderTestCase):
                 maps = [m for _, m, _ in bag.read_messages(topics=['/octomap_binary'])]
                 self.assertEqual([(m.binary, m.id, m.resolution) for m in maps], [(False, 'OcTree', 0.02)])
 
+    def test_the_map_that_is_shipped_is_that_of_its_scene(self):
+        result = run(TOOLS / 'make_scene_bag', CHECKOUT / 'examples/box.yaml', self.folder / 'box.bt')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual((self.folder / 'box.bt').read_bytes(), (CHECKOUT / 'examples/box.bt').read_bytes())
+
     def test_bad_scenes_are_refused_with_file_line_and_key(self):
         bad = self.folder / 'bad.yaml'
         bad.write_text(self.SCENE.read_text().replace('mass_kg: 0.15', 'mass_kg: heavy'))

@@ -1,6 +1,6 @@
 // The surface of a map that follows another one, against the surface of the same leaves that was built whole: bit for
 // bit, over random maps of leaves of all sizes, whole and pruned, and random changes.
-#include "dccd/next_surface.h"
+#include "base/next_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -60,11 +60,11 @@ void change(std::mt19937& random, Voxels& voxels, int kinds) {
 }
 
 void expectSameBits(const VoxelSurface& a, const VoxelSurface& b) {
-  const VoxelTree &x = a.impl().tree, &y = b.impl().tree;
+  const VoxelTree &x = VoxelSurface::Impl::of(a).tree, &y = VoxelSurface::Impl::of(b).tree;
   ASSERT_EQ(a.resolution(), b.resolution());
   ASSERT_EQ(a.bounds().min, b.bounds().min);
   ASSERT_EQ(a.bounds().max, b.bounds().max);
-  ASSERT_EQ(a.impl().features, b.impl().features);
+  ASSERT_EQ(VoxelSurface::Impl::of(a).features, VoxelSurface::Impl::of(b).features);
   ASSERT_EQ(a.memoryBytes(), b.memoryBytes());
   ASSERT_EQ(x.leaves().size(), y.leaves().size());
   for (std::size_t i = 0; i < x.leaves().size(); ++i) {

@@ -260,7 +260,7 @@ TEST(OwnVoxelsProperty, WhatIsOwnIsWhatTheRuleNames) {
                                         [&](const Cell& cell) { return cells.count(cell) == 0; }));
       // However it was made: as from the beginning.
       const auto whole = VoxelSurface::build(VOXEL_M, reduced.surface->leaves());
-      EXPECT_EQ(reduced.surface->impl().features, whole->impl().features);
+      EXPECT_EQ(VoxelSurface::Impl::of(*reduced.surface).features, VoxelSurface::Impl::of(*whole).features);
       remembered += model.remembers();
     }
     own += model.own;

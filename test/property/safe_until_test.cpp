@@ -1,7 +1,7 @@
 // What ~safe_until promises, against adversaries: motions within the bounds that go for contact as fast as they may,
 // whose contacts exact detection finds. And what ~speed_scale is for: an arm that carries a cloth past obstacles.
 // DEFORMABLE_CCD_LONG=1 runs 100,000 motions, and 1,000 arms.
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 
 #include <gtest/gtest.h>
 

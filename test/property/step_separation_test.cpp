@@ -9,6 +9,7 @@
 
 #include "dccd/stream.h"
 #include "oracle/exact_distance.h"
+#include "support/brute_force.h"
 #include "support/query_property.h"
 #include "support/said.h"
 #include "support/step_support.h"
@@ -62,19 +63,18 @@ double separationOf(const NoisyStep& noisy, const Contact& c) {
          radiusOf(noisy, c.body[1], c.vertex.data() + first, 4 - first);
 }
 
-Outcome run(const NoisyStep& noisy, BroadPhase broad_phase, bool earliest_only = false) {
+Outcome run(const NoisyStep& noisy, bool sought, bool earliest_only = false) {
   Options options;
   options.earliest_only = earliest_only;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   options.accuracy.tolerance_m = TOLERANCE_M;
-  options.broad_phase = broad_phase;
   options.check_start_state = false;
   Step step = noisy.step.motion();
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     step.bodies[b].minimum_separation_m = noisy.separation_m[b];
     if (!noisy.radius_m[b].empty()) step.bodies[b].radius_m = share(noisy.radius_m[b]);
   }
-  return Detector(options).run(step);
+  return sought ? Detector(options).run(step) : bruteForce(step, options);
 }
 
 using Key = std::tuple<PairKind, std::array<std::uint16_t, 2>, std::array<Index, 4>>;
@@ -136,8 +136,8 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
   for (int seed = 0; seed < steps; ++seed) {
     const Draw draw = drawFrom(4200 + static_cast<std::uint64_t>(seed));
     const NoisyStep noisy = randomNoisyStep(draw);
-    const Outcome result = run(noisy, BroadPhase::CLUSTERED);
-    ASSERT_EQ(difference(result.contacts, run(noisy, BroadPhase::BRUTE_FORCE).contacts), "") << "seed " << seed;
+    const Outcome result = run(noisy, true);
+    ASSERT_EQ(difference(result.contacts, run(noisy, false).contacts), "") << "seed " << seed;
     std::map<Key, const Contact*> found;
     for (const Contact& c : result.contacts) {
       found[{c.kind, c.body, c.vertex}] = &c;
@@ -181,7 +181,7 @@ TEST(StepSeparation, EarliestOnlyIsTheFirstOfAll) {
   std::uint64_t certain = 0, undecided = 0;
   for (int seed = 0; seed < 200; ++seed) {
     const NoisyStep noisy = randomNoisyStep(drawFrom(7700 + static_cast<std::uint64_t>(seed)));
-    const Outcome full = run(noisy, BroadPhase::CLUSTERED), first = run(noisy, BroadPhase::CLUSTERED, true);
+    const Outcome full = run(noisy, true), first = run(noisy, true, true);
     ASSERT_EQ(first.earliest_toc, full.earliest_toc) << "seed " << seed;
     double upper = 1;
     for (const Contact& c : full.contacts) {
@@ -261,8 +261,8 @@ TEST(StepSeparation, OtherPairsAreAsWithoutNoise) {
     NoisyStep noisy = randomNoisyStep(draw), quiet = noisy;
     for (auto& radius : quiet.radius_m) radius.clear();
     std::map<Key, Contact> without;
-    for (const Contact& c : run(quiet, BroadPhase::CLUSTERED).contacts) without[{c.kind, c.body, c.vertex}] = c;
-    for (const Contact& c : run(noisy, BroadPhase::CLUSTERED).contacts) {
+    for (const Contact& c : run(quiet, true).contacts) without[{c.kind, c.body, c.vertex}] = c;
+    for (const Contact& c : run(noisy, true).contacts) {
       const bool uncertain = separationOf(noisy, c) > separationOf(quiet, c);
       const auto at = without.find({c.kind, c.body, c.vertex});
       if (uncertain) continue;

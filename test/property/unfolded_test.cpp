@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "oracle/oracle.h"
+#include "support/brute_force.h"
 #include "support/detector.h"
 #include "support/query_property.h"
 #include "support/simd_targets.h"
@@ -24,8 +25,7 @@ namespace {
 Outcome bruteForce(const Step& step) {
   Options options;
   options.check_start_state = false;
-  options.broad_phase = BroadPhase::BRUTE_FORCE;
-  return test::Detector(options).run(step);
+  return test::bruteForce(step, options);
 }
 
 /// A band whose faces all point upwards, wound around an axis several times, each turn below the one before.

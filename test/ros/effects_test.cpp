@@ -2,7 +2,6 @@
 #include <deformable_ccd/ClearanceArray.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
-#include <deformable_ccd/LeftOutPairs.h>
 #include <deformable_ccd/State.h>
 
 #include <cmath>
@@ -54,14 +53,11 @@ TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
   EXPECT_EQ(effects.count(), before + 1) << "nothing has changed since";
 }
 
-TEST_F(Felt, WhatIsLeftOutIsListedAndCounted) {
+TEST_F(Felt, WhatIsLeftOutIsCounted) {
   sendBoth(1, 10);
   sendBoth(0.9, 10.1);
-  Probe<deformable_ccd::LeftOutPairs> left_out(node, "/felt/left_out");
-  const deformable_ccd::LeftOutPairs listed = left_out.after(0);
-  ASSERT_FALSE(listed.pairs.empty()) << "latched";
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
-  EXPECT_EQ(stats.last().left_out_listed, listed.pairs.size());
+  EXPECT_GT(stats.last().left_out_listed, 0u);
   EXPECT_GT(stats.last().left_out_met, 0u);
 }
 

@@ -1,8 +1,8 @@
 // Expected contacts through the live node: no alarm in their phase, but found, listed, counted, marked and said.
 #include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/Named.h>
 #include <deformable_ccd/PatchEvent.h>
-#include <deformable_ccd/SetPhase.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/TimeToContact.h>
 
@@ -22,9 +22,9 @@ struct Pressing : MonitorTest {
   Probe<State> state{node, name_ + "/state"};
   Probe<deformable_ccd::FirstContact> first{node, name_ + "/first_contact"};
 
-  deformable_ccd::SetPhase::Response setPhase(const std::string& phase) {
-    deformable_ccd::SetPhase call;
-    call.request.phase = phase;
+  deformable_ccd::Named::Response setPhase(const std::string& phase) {
+    deformable_ccd::Named call;
+    call.request.name = phase;
     EXPECT_TRUE(ros::service::call(name_ + "/set_phase", call));
     return call.response;
   }

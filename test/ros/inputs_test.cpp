@@ -1,5 +1,6 @@
 // What a launch argument or a parameter names is called for: a named map that does not come, or that is refused, is
 // NO_MAP, at WARN in diagnostics and never clear. What nobody named is not missed.
+#include "ros/support/bytes_of.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
@@ -73,9 +74,7 @@ struct Inputs : MonitorTest {
 /// The same bytes under another name of the type. What differs in more than the name does not even connect: a
 /// subscription that has taken one type keeps to it.
 topic_tools::ShapeShifter forked(const octomap_msgs::Octomap& map) {
-  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(map));
-  ros::serialization::OStream out(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  ros::serialization::serialize(out, map);
+  std::vector<std::uint8_t> bytes = bytesOf(map);
   ros::serialization::IStream in(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
   topic_tools::ShapeShifter message;
   namespace traits = ros::message_traits;

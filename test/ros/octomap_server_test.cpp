@@ -11,7 +11,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/missing.h"
 #include "ros/support/rate.h"

@@ -243,7 +243,6 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/octomap_server/mesh");
   drop(0.31, -0.02, [&](double z) { publisher.publish(clothOf(5, 9, z)); });
   EXPECT_TRUE(rest.contacts.empty()) << "its own voxels are no obstacle";
-  EXPECT_EQ(rest.suppressed_contacts, 0u);
   EXPECT_GT(touching(), 0u) << "the table is no part of the cloth";
 }
 

@@ -1,11 +1,9 @@
 // A robot's links through the live node: joint states become tf by robot_state_publisher, and tf carries the links.
 #include <deformable_ccd/AttachObject.h>
-#include <deformable_ccd/DetachObject.h>
 #include <deformable_ccd/FirstContact.h>
-#include <deformable_ccd/RemoveObject.h>
+#include <deformable_ccd/Named.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SetHold.h>
-#include <deformable_ccd/SetPhase.h>
 #include <deformable_ccd/State.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <dynamic_reconfigure/Reconfigure.h>
@@ -143,7 +141,7 @@ TEST_F(Held, WhatIsAttachedGoesWithTheLinkUntilItIsLetGo) {
                     file = files.substr(files.find('/'), files.find(".step") + 5 - files.find('/'));
   EXPECT_EQ(std::system(("rosrun deformable_ccd replay_step " + file).c_str()), 0) << files;
   EXPECT_FALSE(moveTo(0.5, 130.3).clear) << "on its way back through it";
-  deformable_ccd::DetachObject let_go;
+  deformable_ccd::Named let_go;
   let_go.request.name = "rod";
   EXPECT_TRUE(moveTo(0.5, 130.35).clear);
   EXPECT_GT(promisedAt(130.35).seconds, 0);
@@ -154,7 +152,7 @@ TEST_F(Held, WhatIsAttachedGoesWithTheLinkUntilItIsLetGo) {
   lift(130.6, 0.3);
   EXPECT_TRUE(moveTo(0.5, 130.5).clear) << "the plate rises to 0.3, the disc stays at 0.3, and would be at 0.5";
   EXPECT_TRUE(moveTo(0.31, 130.6).clear) << "just above the disc";
-  deformable_ccd::RemoveObject remove;
+  deformable_ccd::Named remove;
   remove.request.name = "rod";
   EXPECT_GT(promisedAt(130.6).seconds, 0);
   ASSERT_TRUE(called("/held/remove", remove).success);
@@ -187,10 +185,10 @@ TEST_F(Held, WhatIsRefusedIsAnsweredInALineAndCounted) {
   EXPECT_FALSE(unknown.success);
   EXPECT_EQ(unknown.message,
             "object 'rod': link is 'plat', which is no link of a robot and no rigid body; nearest is 'plate'");
-  deformable_ccd::DetachObject let_go;
+  deformable_ccd::Named let_go;
   let_go.request.name = "rod";
   EXPECT_FALSE(called("/held/detach", let_go).success);
-  deformable_ccd::RemoveObject remove;
+  deformable_ccd::Named remove;
   EXPECT_FALSE(called("/held/remove", remove).success);
   EXPECT_TRUE(waitUntil([&] { return std::stoi(refused()) == before + 3; })) << refused();
 }
@@ -214,7 +212,7 @@ TEST_F(Held, ExactIsRefusedAsLongAsSomethingAttachedHasPadding) {
   const auto said = called("/held/attach", padded);
   ASSERT_TRUE(said.success) << said.message;
   EXPECT_EQ(setAccuracy(Accuracy::EXACT), Accuracy::CONSERVATIVE);
-  deformable_ccd::RemoveObject remove;
+  deformable_ccd::Named remove;
   remove.request.name = "rod";
   ASSERT_TRUE(called("/held/remove", remove).success);
   EXPECT_EQ(setAccuracy(Accuracy::EXACT), Accuracy::EXACT);
@@ -304,13 +302,13 @@ TEST_F(Changing, WhatTheHandHoldsIsExpectedUntilItIsSaidToBeOpen) {
 TEST_F(Changing, APhaseThatEndsTakesThePromiseWithIt) {
   deformable_ccd::SetHold open;
   EXPECT_TRUE(called("/changing/set_hold", open).success);
-  deformable_ccd::SetPhase phase;
-  phase.request.phase = "press";
+  deformable_ccd::Named phase;
+  phase.request.name = "press";
   EXPECT_TRUE(called("/changing/set_phase", phase).success);
   EXPECT_EQ(moveTo(0.05, begin_s + 0.1).touching, State::EXPECTED);
   EXPECT_EQ(promisedAt(begin_s + 0.1).seconds, 10);
   const std::uint64_t broken = stats.after(0).promises_broken;
-  phase.request.phase = "";
+  phase.request.name = "";
   EXPECT_TRUE(called("/changing/set_phase", phase).success);
   expectRevoked("other contacts are expected now");
   EXPECT_EQ(moveTo(0.06, begin_s + 0.2).touching, State::NEW);

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "dccd/types.h"
 
 namespace dccd {

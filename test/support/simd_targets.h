@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 
 namespace dccd {
 namespace test {

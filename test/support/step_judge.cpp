@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "support/brute_force.h"
+
 namespace dccd {
 namespace test {
 namespace {
@@ -44,14 +46,13 @@ std::string judgeStep(const TestStep& step) {
   const std::vector<StartIntersection> start = trueStart(step);
   std::string finding;
   forEachSimdTarget([&](const std::string& target) {
-    for (const BroadPhase broad_phase : {BroadPhase::CLUSTERED, BroadPhase::BRUTE_FORCE}) {
-      Options options;
-      options.broad_phase = broad_phase;
-      const Outcome result = runOnce(step, options);
+    for (const bool sought : {true, false}) {
+      const Options options;
+      const Outcome result = sought ? runOnce(step, options) : bruteForce(step.motion(), options);
       std::string wrong = judgeContacts(result.contacts, contacts, options.accuracy.toc_bits);
       if (wrong.empty()) wrong = judgeStart(result, start);
       if (wrong.empty() || !finding.empty()) continue;
-      finding = (broad_phase == BroadPhase::CLUSTERED ? "clustered, " : "brute force, ") + target + ": " + wrong;
+      finding = (sought ? "clustered, " : "brute force, ") + target + ": " + wrong;
     }
   });
   return finding;

@@ -6,7 +6,7 @@
 #include <random>
 #include <sstream>
 
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 
 namespace dccd {
 namespace test {

@@ -62,21 +62,10 @@ bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
   return true;
 }
 
-StatsContext ResultBag::contextOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far) {
-  StatsContext context = countersOf(pipeline, so_far);
-  if (!pipeline.fixedFrame().empty()) ++markers_built_;  // before a frame was taken there is none to draw in
-  context.markers_built = markers_built_;
-  return context;
-}
-
-void ResultBag::addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at) {
+void ResultBag::addPlan(MonitorPipeline& pipeline, const ros::Time& at) {
   const std::string& frame = pipeline.fixedFrame();
   EffectTracker& effects = pipeline.effects();
   if (effects.takeNewPlan()) write("effects", at, effects.message(at, frame));
-  if (effects.takeNewLeftOut(pipeline.monitor())) {
-    write("left_out", at,
-          toLeftOutPairs(pipeline.monitor().leftOut(), pipeline.monitor().bodies(), outcome.stamp_ns, frame));
-  }
 }
 
 void ResultBag::addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
@@ -123,9 +112,9 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
                     const ros::Time& at) {
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  const StatsContext context = contextOf(pipeline, so_far);
+  const StatsContext context = countersOf(pipeline, so_far);
   write("contacts", at, toContactArray(outcome, bodies, frame));
-  addPlan(outcome, pipeline, at);
+  addPlan(pipeline, at);
   write("stats", at, toStepStats(outcome, context, frame));
   write("first_contact", at, toFirstContact(outcome, bodies, frame));
   addPatches(outcome, pipeline, at);

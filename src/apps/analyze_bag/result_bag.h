@@ -24,14 +24,12 @@ class ResultBag {
   template <class Message>
   void write(const char* name, const ros::Time& at, const Message& message);
   bool copyOthersDiagnostics(const rosbag::MessageInstance& m);
-  StatsContext contextOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
-  void addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at);
+  void addPlan(MonitorPipeline& pipeline, const ros::Time& at);
   void addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
   void addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
   void addPromise(const Outcome& outcome, const MonitorPipeline& pipeline, bool proved, const ros::Time& at);
 
   OutputBag bag_;
-  std::uint64_t markers_built_ = 0;
   Diagnostics diagnostics_;
   std::string map_source_;  // where the octomap is looked for; empty when none is expected
 };

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/analyze_bag/thinned_mesh.h"
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "stream/quantile.h"
 
 namespace dccd {

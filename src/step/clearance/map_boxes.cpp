@@ -5,7 +5,7 @@ namespace dccd {
 void MapBoxes::set(std::shared_ptr<const VoxelSurface> surface) {
   if (surface == surface_) return;
   surface_ = nullptr;  // until all boxes are made: memory may end
-  const VoxelTree& tree = surface->impl().tree;
+  const VoxelTree& tree = VoxelSurface::Impl::of(*surface).tree;
   const double resolution_m = surface->resolution();
   for (int level = 0; level < VoxelTree::LEVELS; ++level) {
     const std::vector<VoxelTree::Node>& nodes = tree.nodes(level);

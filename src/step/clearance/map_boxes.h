@@ -56,7 +56,7 @@ class DCCD_HIDDEN MapBoxes {
   // A node of a level, or a leaf: four bits for the level, 28 for its number there.
   static constexpr std::uint32_t LEAF_LEVEL = VoxelTree::LEVELS, NUMBER = 0x0fffffff;
   static std::uint32_t name(std::uint32_t level, std::uint32_t number) { return level << 28 | number; }
-  const VoxelTree& tree() const { return surface_->impl().tree; }
+  const VoxelTree& tree() const { return VoxelSurface::Impl::of(*surface_).tree; }
 
   std::shared_ptr<const VoxelSurface> surface_;
   std::array<std::vector<StepBox>, VoxelTree::LEVELS> boxes_;

@@ -13,7 +13,7 @@
 #include <limits>
 #include <vector>
 
-#include "dccd/deadline.h"
+#include "dccd/types.h"
 #include "step/clearance/hull_pair.h"
 #include "step/clearance/step_box.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "step/history.h"
 #include "step/pairs/closest_points.h"
 

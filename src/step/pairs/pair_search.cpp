@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "dccd/accuracy.h"
+#include "base/accuracy.h"
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 #include "step/conclude.h"
@@ -32,16 +32,13 @@ void keepShare(bool sample, std::vector<std::uint32_t>& pairs) {
   pairs.resize(kept);
 }
 
-/// Only the first contact is wanted, and what cannot touch before it is not looked at.
-bool stopsAtFirst(const Part& part) {
-  const Options& options = part.options();
-  return options.earliest_only && options.accuracy.rung == Accuracy::EXACT &&
-         options.broad_phase == BroadPhase::CLUSTERED;
-}
-
 }  // namespace
 
-bool PairSearch::Search::isBruteForce() const { return prepared.options->broad_phase == BroadPhase::BRUTE_FORCE; }
+/// Only the first contact is wanted, and what cannot touch before it is not looked at.
+bool PairSearch::stopsAtFirst(const Part& part) const {
+  const Options& options = part.options();
+  return options.earliest_only && options.accuracy.rung == Accuracy::EXACT && !brute_force_;
+}
 
 void PairSearch::begin() {
   for (PairWorker& worker : workers_) worker.beginStep();
@@ -83,7 +80,7 @@ void PairSearch::addTasks(const Search& search, PairKind kind, std::size_t a, st
   const TreePair trees = context.treesOf(kind, a, b);
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return;
   PairTask task{kind, static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b), a == b, 0, 0, false};
-  if (search.isBruteForce()) {
+  if (brute_force_) {
     tasks_.push_back(task);
     return;
   }
@@ -186,7 +183,7 @@ void PairSearch::runTasks(const Search& search) {
     PairWorker& worker = workers_.local();
     for (std::size_t t = next++; t < tasks_.size(); t = next++) {
       task_hits_[t] = {&worker, worker.hits(tasks_[t].kind).size()};
-      if (search.isBruteForce()) {
+      if (brute_force_) {
         worker.runBruteForce(context, tasks_[t], t);
       } else {
         worker.run(context, tasks_[t], t, group_pairs_);
@@ -234,7 +231,7 @@ void PairSearch::cutHits(const Search& search) {
     const PairTask& task = tasks_[t];
     // A worker's later tasks lie behind in its list, and so go with the first.
     task_hits_[t].worker->dropHits(task.kind, task_hits_[t].begin + (t == cut ? listed : 0));
-    if (search.isBruteForce()) {
+    if (brute_force_) {
       leaveOut(0, true, search.result);
       continue;
     }

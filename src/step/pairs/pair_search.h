@@ -20,6 +20,8 @@ class PairSearch {
  public:
   using Workers = tbb::enumerable_thread_specific<PairWorker>;
 
+  /// For tests, which hold the search against it: from now on every pair is tested, and none is looked for.
+  void testAll() { brute_force_ = true; }
   /// A part of a step begins: what the last one found is forgotten.
   void begin();
   /// Pairs of two bodies, and of those with themselves that are to be. shortened: the part's scene; with earliest_only
@@ -44,9 +46,9 @@ class PairSearch {
     std::size_t found_limit;  // what may still be found
     Findings& result;
     Share share = Share::ALL;
-    bool isBruteForce() const;
   };
 
+  bool stopsAtFirst(const Part& part) const;
   void runUntilFirst(Search& search, const SelfTests& self_tests, SceneArrays& shortened);
   void findPairs(const Search& search, const SelfTests& self_tests);
   void addSelfTasks(const Search& search, std::size_t body);
@@ -55,6 +57,7 @@ class PairSearch {
   void runTasks(const Search& search);
   void cutHits(const Search& search);
 
+  bool brute_force_ = false;
   Workers workers_;
   std::vector<PairTask> tasks_;
   std::vector<TaskHits> task_hits_;  // per task

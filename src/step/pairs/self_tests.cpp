@@ -18,8 +18,8 @@ bool staysApart(const Part& part, std::size_t b, const std::vector<std::uint8_t>
 
 bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t b) {
   const SceneBody& body = scene.bodies()[b];
-  // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
-  if (!options.unfolded_test || options.broad_phase == BroadPhase::BRUTE_FORCE) return false;
+  // With a distance, not touching is not enough.
+  if (!options.unfolded_test) return false;
   return scene.separation(b, b) == 0 && !body.uncertain && !body.masked;
 }
 

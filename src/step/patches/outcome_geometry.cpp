@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "dccd/contact_geometries.h"
+#include "base/contact_geometries.h"
 #include "step/pairs/closest_points.h"
 #include "step/parts.h"
 #include "step/patches/touch_lanes.h"

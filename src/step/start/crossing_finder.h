@@ -8,7 +8,7 @@
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
-#include "dccd/deadline.h"
+#include "dccd/types.h"
 #include "simd/face_filter.h"
 #include "step/start/neighbourhood.h"
 

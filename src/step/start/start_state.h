@@ -11,7 +11,7 @@
 
 #include "culling/scene_arrays.h"
 #include "culling/unfolded.h"
-#include "dccd/deadline.h"
+#include "dccd/types.h"
 #include "step/pairs/found_limit.h"
 #include "step/start/crossing_finder.h"
 #include "step/start/neighbourhood.h"

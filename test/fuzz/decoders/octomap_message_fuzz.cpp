@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "dccd/octomap_decode.h"
+#include "base/octomap_decode.h"
 #include "fuzz/fuzz_target.h"
 #include "node/map_loader.h"
 #include "octomap/octomap_header.h"

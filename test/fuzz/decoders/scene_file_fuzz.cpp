@@ -2,8 +2,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "apps/make_scene_bag/physics/scene_file.h"
 #include "fuzz/fuzz_target.h"
+#include "scenes/physics/scene_file.h"
 
 namespace {
 

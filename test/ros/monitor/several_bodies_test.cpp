@@ -38,7 +38,6 @@ TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
   EXPECT_TRUE(isAdvertised("/plain/time_to_contact"));
   EXPECT_FALSE(isAdvertised("/pair/time_to_contact")) << "no look-ahead";
   EXPECT_FALSE(isAdvertised("/pair/predicted_contacts"));
-  EXPECT_FALSE(isAdvertised("/pair/left_out")) << "no separation";
 }
 
 struct Tabled : MonitorTest {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "support/brute_force.h"
 #include "support/closed_meshes.h"
 #include "support/detector.h"
 #include "support/surfaces.h"
@@ -14,25 +15,25 @@
 namespace dccd {
 namespace {
 
-Outcome runStep(const Topology& topology, const Positions& t0, const Positions& t1, BroadPhase broad_phase,
+Outcome runStep(const Topology& topology, const Positions& t0, const Positions& t1, bool sought = true,
                 double separation_m = 0, const std::vector<double>* radius_m = nullptr) {
   Options options;
   options.accuracy.rung = separation_m > 0 || radius_m ? Accuracy::CONSERVATIVE : Accuracy::EXACT;
-  options.broad_phase = broad_phase;
   options.check_start_state = false;
   Body body;
   body.name = "cloth";
   body.topology = std::make_shared<const Topology>(topology);
   body.minimum_separation_m = separation_m;
-  return test::Detector(options).run(test::stepOf(body, t0, t1, radius_m));
+  const Step step = test::stepOf(body, t0, t1, radius_m);
+  return sought ? test::Detector(options).run(step) : test::bruteForce(step, options);
 }
 
 bool certified(const Topology& topology, const Positions& t0, const Positions& t1) {
-  return runStep(topology, t0, t1, BroadPhase::CLUSTERED).stats.unfolded_bodies == 1;
+  return runStep(topology, t0, t1, true).stats.unfolded_bodies == 1;
 }
 
 std::size_t trueContacts(const Topology& topology, const Positions& t0, const Positions& t1) {
-  return runStep(topology, t0, t1, BroadPhase::BRUTE_FORCE).contacts.size();
+  return runStep(topology, t0, t1, false).contacts.size();
 }
 
 /// A strip of two rows along a curve in the plane, optionally rising.
@@ -57,17 +58,16 @@ TEST(Unfolded, WavingClothIsCertified) {
       t1.emplace_back(0.02 * c + 0.001, 0.02 * r, 0.03 * std::sin(0.3 * c + 0.2 * r + 0.5) - 0.01);
     }
   }
-  const Outcome result = runStep(topology, t0, t1, BroadPhase::CLUSTERED);
+  const Outcome result = runStep(topology, t0, t1, true);
   EXPECT_EQ(result.stats.unfolded_bodies, 1u);
   EXPECT_EQ(result.stats[Effect::SELF_COLLISION].in, 0u);
   EXPECT_EQ(trueContacts(topology, t0, t1), 0u);
-  EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 1e-4).stats.unfolded_bodies, 0u)
+  EXPECT_EQ(runStep(topology, t0, t1, true, 1e-4).stats.unfolded_bodies, 0u)
       << "not touching is not enough with a separation";
   std::vector<double> radius(1200, 0.0);
-  EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius).stats.unfolded_bodies, 1u)
-      << "a tracker that is sure";
+  EXPECT_EQ(runStep(topology, t0, t1, true, 0, &radius).stats.unfolded_bodies, 1u) << "a tracker that is sure";
   radius[77] = 0.03;
-  const Outcome uncertain = runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius);
+  const Outcome uncertain = runStep(topology, t0, t1, true, 0, &radius);
   EXPECT_EQ(uncertain.stats.unfolded_bodies, 0u) << "nor with a vertex that is only known to a radius";
   EXPECT_FALSE(uncertain.contacts.empty()) << "which reaches its neighbours";
 }

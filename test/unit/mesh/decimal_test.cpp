@@ -1,4 +1,4 @@
-#include "dccd/decimal.h"
+#include "base/decimal.h"
 
 #include <clocale>
 #include <cmath>

@@ -68,7 +68,7 @@ TEST(KnownSpace, UnknownLeavesFillTheCropBox) {
   all.insert(all.end(), unknown.begin(), unknown.end());
   const auto surface = VoxelSurface::build(RESOLUTION, all);
   int corners = 0;
-  for (const FeatureMask mask : surface->impl().features) corners += bitCount(mask & CORNER_MASK);
+  for (const FeatureMask mask : VoxelSurface::Impl::of(*surface).features) corners += bitCount(mask & CORNER_MASK);
   EXPECT_EQ(corners, 8);
 }
 

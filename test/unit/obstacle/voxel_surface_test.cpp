@@ -72,7 +72,7 @@ FeatureMask featuresOfFaces(unsigned faces) {
 /// Features of these kinds, each leaf's own.
 std::size_t count(const VoxelSurface& surface, FeatureMask kinds) {
   std::size_t found = 0;
-  for (const FeatureMask mask : surface.impl().features) found += bitCount(mask & kinds);
+  for (const FeatureMask mask : VoxelSurface::Impl::of(surface).features) found += bitCount(mask & kinds);
   return found;
 }
 
@@ -106,7 +106,7 @@ TEST(VoxelSurface, ExposesWhatTheDefinitionSays) {
     ASSERT_EQ(surface->leafCount(), leaves.size());
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       const OccupiedLeaf& leaf = surface->leaves()[i];
-      EXPECT_EQ(surface->impl().features[i], expectedFeatures(leaf, voxels))
+      EXPECT_EQ(VoxelSurface::Impl::of(*surface).features[i], expectedFeatures(leaf, voxels))
           << "leaf " << leaf.min.x << " " << leaf.min.y << " " << leaf.min.z << " size " << leaf.size;
     }
   }

@@ -8,7 +8,7 @@
 #include <set>
 #include <sstream>
 
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "support/seen_scene.h"
 
 namespace dccd {

@@ -1,5 +1,5 @@
 // What sensors see, to one map: views whose rays can be counted by hand. cloud_map_rays_test.cpp has the others.
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "support/said.h"
 #include "support/seen_scene.h"
 

@@ -1,5 +1,5 @@
 // Round trips with liboctomap's own writers, and streams that are cut, flipped or made to hurt.
-#include "dccd/octomap_decode.h"
+#include "base/octomap_decode.h"
 
 #include <gtest/gtest.h>
 #include <octomap/ColorOcTree.h>

@@ -1,5 +1,5 @@
 // What a scene's camera sees, against geometry that is looked up point by point along each ray.
-#include "apps/make_scene_bag/physics/depth_camera.h"
+#include "scenes/physics/depth_camera.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "apps/make_scene_bag/physics/scene_file.h"
-#include "apps/make_scene_bag/physics/shapes.h"
+#include "scenes/physics/scene_file.h"
+#include "scenes/physics/shapes.h"
 
 namespace dccd::scene {
 namespace {

@@ -1,5 +1,5 @@
 // Scene files: what is read, and what is refused with file, line, key and what to write instead.
-#include "apps/make_scene_bag/physics/scene_file.h"
+#include "scenes/physics/scene_file.h"
 #include "support/said.h"
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // The physics that records scenes: only the named effects, equal seeds give equal motion, and motion that can be
 // checked by hand comes out as it should.
-#include "apps/make_scene_bag/physics/simulation.h"
+#include "scenes/physics/simulation.h"
 
 #include <algorithm>
 #include <string>
@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "apps/make_scene_bag/physics/scene_file.h"
-#include "apps/make_scene_bag/physics/shapes.h"
+#include "scenes/physics/scene_file.h"
+#include "scenes/physics/shapes.h"
 
 namespace dccd::scene {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 #include "record/step_replay.h"
 #include "support/recordings.h"
 #include "support/step_support.h"

@@ -1,4 +1,4 @@
-// What /diagnostics tells between outcomes: the counters of now, and the complaint that helps.
+// What /diagnostics tells between outcomes: the counters of now, and the hint that helps.
 #include "output/diagnostics.h"
 
 #include <gtest/gtest.h>

@@ -71,13 +71,12 @@ std::string shown(std::size_t value) { return std::to_string(value); }
 /// they are needed, as the test below sees.
 Defaults defaultsInTheCode() {
   XmlRpcValue tree;
-  tree["bodies"]["NAME"]["weld"] = "on";  // XML-RPC has no empty section; the default is that of `single`
+  tree["bodies"]["NAME"]["motion"] = "stream";  // XML-RPC has no empty section; the default is that of `single`
   tree["bodies"]["pad"]["rigid"]["mesh"] = "pad.stl";
   tree["bodies"]["pad"]["rigid"]["frame"] = "pad";
   const MonitorConfig config = readConfig(tree);
   const BodyConfig &body = config.bodies.at(0), &pad = config.bodies.at(1);
   EXPECT_FALSE(pad.body.self_collision) << "the page says so";
-  const BodyConfig single = readConfig(XmlRpcValue()).bodies.at(0);
   const auto source = body.input.source == TopologySource::AUTO ? "auto" : "another";
   return {
       {"topic", body.topic},
@@ -92,8 +91,6 @@ Defaults defaultsInTheCode() {
       {"topology/max_range_m", shown(body.input.depth.max_range_m)},
       {"topology/min_range_m", shown(body.input.depth.min_range_m)},
       {"topology/median", shown(body.input.depth.median)},
-      {"weld", single.input.weld ? "`on`" : "`off`"},
-      {"max_vertices", shown(body.input.max_vertices)},
       {"marker/namespace", body.input.marker_namespace ? "set" : "none"},
       {"marker/id", body.input.marker_id ? "set" : "none"},
       {"motion", body.body.motion == BodyMotionKind::STREAM ? "`stream`" : "`static`"},
@@ -183,24 +180,17 @@ Defaults inForceOfTheNode() {
   const RobotConfig robot;
   constexpr std::size_t MB = std::size_t{1} << 20;
   return {{"accuracy", toString(detector.accuracy.rung)},
-          {"tolerance_m", plain(detector.accuracy.tolerance_m)},
-          {"toc_bits", plain(detector.accuracy.toc_bits)},
-          {"max_subdivisions", plain(detector.accuracy.max_subdivisions)},
           {"num_threads", plain(detector.num_threads)},
           {"record_steps", plain(config.record_steps)},
-          {"simd_target", config.simd_target},
           {"step_budget_ms", plain(detector.step_budget_ms)},
           {"minimum_separation_m", plain(config.minimum_separation_m)},
           {"max_step_s", plain(monitor.store.max_step_s)},
           {"max_vertex_step_m", plain(monitor.store.max_vertex_step_m)},
           {"look_ahead_s", plain(monitor.look_ahead_s)},
-          {"clearance/tolerance_m", plain(detector.clearance.tolerance_m)},
           {"clearance/max_m", plain(detector.clearance.max_m)},
           {"clearance/self_m", plain(detector.clearance.self_m)},
           {"max_contacts", plain(detector.max_contacts)},
           {"max_memory_mb", plain(config.max_memory_bytes / MB)},
-          {"max_compute_s", plain(detector.max_compute_ms / 1e3)},
-          {"initial_contacts", detector.suppress_initial ? "suppress" : "report"},
           {"octomap_topic", config.octomap_topic},
           {"obstacle_cloud_topic", config.clouds.front().topic},
           {"obstacle_resolution_m", plain(config.cloud_map.resolution_m)},
@@ -209,8 +199,6 @@ Defaults inForceOfTheNode() {
           {"obstacle_no_return", config.cloud_map.no_return_clears ? "clears" : "stays"},
           {"sensor_model/hit", plain(config.cloud_map.hit)},
           {"sensor_model/miss", plain(config.cloud_map.miss)},
-          {"sensor_model/min", plain(config.cloud_map.min)},
-          {"sensor_model/max", plain(config.cloud_map.max)},
           {"own_voxels_m", plain(config.own_voxels_m)},
           {"own_voxels_lag_s", plain(monitor.own_voxels_lag_s)},
           {"own_voxels_doubt", monitor.own_voxels_trust ? "trust" : "unproved"},
@@ -224,15 +212,10 @@ Defaults inForceOfTheNode() {
           {"queue_size", plain(config.queue_size)},
           {"queue_policy", config.queue_policy == QueuePolicy::NEWEST ? "newest" : "other"},
           {"rigid_tolerance_m", plain(detector.rigid_tolerance_m)},
-          {"max_substeps", plain(detector.max_substeps)},
           {"effects/NAME", toString(config.effects.at(Effect::SELF_COLLISION))},
           {"markers/point_size_m", plain(config.markers.point_size_m)},
-          {"markers/normal_length_m", plain(config.markers.normal_length_m)},
-          {"markers/line_width_m", plain(config.markers.line_width_m)},
-          {"markers/max_contacts", plain(config.markers.max_contacts)},
           {"markers/mesh", plain(config.markers.mesh)},
           {"markers/obstacle_m", plain(config.markers.obstacle_m)},
-          {"markers/swept", plain(config.markers.swept)},
           {"robot/timeout_s", plain(robot.timeout_s)},
           {"robot/padding_m", plain(robot.padding_m)},
           {"robot/max_own_voxels", plain(robot.max_own_voxels)},
@@ -241,7 +224,6 @@ Defaults inForceOfTheNode() {
           {"max_acceleration_m_s2", plain(config.max_acceleration_m_s2)},
           {"speed_scale/uncertainty_m", plain(SpeedLaw().uncertainty_m)},
           {"robot/speed_factor", plain(robot.speedOr(config.speed).last_step_factor)},
-          {"robot/scale", plain(robot.scale)},
           {"robot/against_links", plain(robot.against_links)},
           {"robot/against_map", plain(robot.against_map)},
           {"robot/visuals", plain(robot.visuals)},
@@ -268,13 +250,10 @@ TEST(InterfacePage, DefaultsOfTheNodeAreThoseInForceWhereNoneIsGiven) {
                                       "fixed_frame",
                                       "minimum_separation_pairs",
                                       "obstacle_box",
-                                      "obstacle_camera_info_topic",
                                       "obstacle_cloud_topics",
-                                      "obstacle_sensor_frame",
                                       "octomap_file",
                                       "octomap_frame",
                                       "phase",
-                                      "record_folder",
                                       "robot/description",
                                       "robot/leave_out",
                                       "robot/links",

@@ -58,9 +58,9 @@ void expectDart(const MeshFile& mesh) { EXPECT_EQ(mesh.faces, (std::vector<Face>
 
 void expectUnchecked(const MeshFile& mesh, const std::vector<std::size_t>& polygons, const std::string& first) {
   EXPECT_EQ(mesh.unchecked, polygons);
-  ASSERT_EQ(mesh.remarks.size(), 1u);
-  EXPECT_TRUE(mentions(mesh.remarks[0], "are unchecked, the first is ")) << mesh.remarks[0];
-  EXPECT_TRUE(mentions(mesh.remarks[0], first)) << mesh.remarks[0];
+  ASSERT_EQ(mesh.hints.size(), 1u);
+  EXPECT_TRUE(mentions(mesh.hints[0], "are unchecked, the first is ")) << mesh.hints[0];
+  EXPECT_TRUE(mentions(mesh.hints[0], first)) << mesh.hints[0];
 }
 
 // --- OBJ
@@ -73,7 +73,7 @@ class ObjGrammar : public Grammar {
   void expectFaces(const std::string& text) {
     const MeshFile mesh = faces(text);
     expectTwo(mesh, text);
-    EXPECT_TRUE(mesh.remarks.empty()) << text;
+    EXPECT_TRUE(mesh.hints.empty()) << text;
   }
   void expectLine5(const std::string& text, const std::string& word) {
     expectRefused("a.obj", vertices() + text, "a.obj:5: ", word);
@@ -250,8 +250,8 @@ TEST_F(ObjGrammar, LinesOfNumbers) {
 TEST_F(ObjGrammar, UnknownKeywords) {
   const MeshFile mesh = faces("face 1 2 3\nf 1 2 3\nf1 2 3\nf 3 2 4\n");
   expectTwo(mesh, "unknown");
-  ASSERT_EQ(mesh.remarks.size(), 1u);
-  EXPECT_TRUE(mentions(mesh.remarks[0], "2 lines") && mentions(mesh.remarks[0], "'face' in line 5")) << mesh.remarks[0];
+  ASSERT_EQ(mesh.hints.size(), 1u);
+  EXPECT_TRUE(mentions(mesh.hints[0], "2 lines") && mentions(mesh.hints[0], "'face' in line 5")) << mesh.hints[0];
 }
 
 // --- STL
@@ -343,7 +343,7 @@ TEST_F(StlGrammar, Binary) {
   for (const std::string header : {"", "binary", "solid", "SOLID vertex 1 2 3"}) {
     const MeshFile mesh = read("a.stl", binary(2, header));
     expectTwo(mesh, header);
-    EXPECT_TRUE(mesh.remarks.empty());
+    EXPECT_TRUE(mesh.hints.empty());
   }
 }
 
@@ -353,8 +353,8 @@ TEST_F(StlGrammar, Padding) {
     for (const std::string header : {"binary", "solid"}) {
       const MeshFile mesh = read("a.stl", binary(2, header) + more);
       expectTwo(mesh, header);
-      ASSERT_EQ(mesh.remarks.size(), 1u);
-      EXPECT_TRUE(mentions(mesh.remarks[0], std::to_string(more.size()) + " bytes")) << mesh.remarks[0];
+      ASSERT_EQ(mesh.hints.size(), 1u);
+      EXPECT_TRUE(mentions(mesh.hints[0], std::to_string(more.size()) + " bytes")) << mesh.hints[0];
     }
   }
 }
@@ -398,10 +398,10 @@ TEST_F(StlGrammar, Sequences) {
   EXPECT_EQ(torn[0].faces, (std::vector<Face>{{0, 1, 2}, {3, 1, 4}}));
   EXPECT_EQ(torn[0].positions[2], torn[0].positions[3]);
   std::vector<MeshFile> grown = frames(two() + thin, two() + wide);
-  ASSERT_EQ(grown[0].remarks.size(), 1u) << "unchecked by itself";
+  ASSERT_EQ(grown[0].hints.size(), 1u) << "unchecked by itself";
   EXPECT_EQ(matchSoups(grown), 1u);
   EXPECT_EQ(grown[0].faces.size(), 3u);
-  EXPECT_TRUE(grown[0].unchecked.empty() && grown[0].remarks.empty()) << "a triangle that grows";
+  EXPECT_TRUE(grown[0].unchecked.empty() && grown[0].hints.empty()) << "a triangle that grows";
   std::vector<MeshFile> still = frames(two() + thin, two() + thin);
   EXPECT_EQ(matchSoups(still), 0u);
   expectUnchecked(still[1], {2}, "triangle 2, in line 16");
@@ -622,8 +622,8 @@ TEST_F(PlyGrammar, OtherElements) {
                                            "element none 0\nproperty int a\n") +
                                           "0.5\n" + points() + "2 0.5 0.5\n0\n" + faces());
   expectTwo(mesh, "skipped");
-  ASSERT_EQ(mesh.remarks.size(), 2u);
-  EXPECT_TRUE(mentions(mesh.remarks[1], "'material' (2)")) << mesh.remarks[1];
+  ASSERT_EQ(mesh.hints.size(), 2u);
+  EXPECT_TRUE(mentions(mesh.hints[1], "'material' (2)")) << mesh.hints[1];
 }
 
 TEST_F(PlyGrammar, Edges) {
@@ -635,7 +635,7 @@ TEST_F(PlyGrammar, Edges) {
   };
   const MeshFile ropes = read("a.ply", edges("0 255 1\n3 0 2\n"));
   EXPECT_EQ(ropes.edges, (std::vector<Edge>{{0, 1}, {2, 3}}));
-  EXPECT_TRUE(ropes.faces.empty() && ropes.remarks.empty());
+  EXPECT_TRUE(ropes.faces.empty() && ropes.hints.empty());
   expectRefused("a.ply", edges("0 0 4\n"), "a.ply:18: ", "edge 0 names vertex 4 of 4");
   expectRefused("a.ply", edges("0 0 1\n2 0 2\n"), "a.ply:19: ", "edge 1 names vertex 2 twice");
   expectRefused("a.ply", edges("0 0 1\n", "float"), "a.ply:18: ", "no integer");
@@ -665,8 +665,7 @@ TEST_F(PlyGrammar, EndOfBytes) {
   for (const std::string& more : {std::string(12, '\0'), std::string("\n")}) {
     const MeshFile mesh = read("a.ply", bytes + more);
     expectTwo(mesh, "padding");
-    EXPECT_TRUE(mentions(mesh.remarks.back(), std::to_string(more.size()) + " bytes of padding"))
-        << mesh.remarks.back();
+    EXPECT_TRUE(mentions(mesh.hints.back(), std::to_string(more.size()) + " bytes of padding")) << mesh.hints.back();
   }
   expectRefused("a.ply", bytes + "\1", "a.ply: ", "counts are too low");
 }

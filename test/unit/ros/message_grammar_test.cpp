@@ -13,6 +13,7 @@
 
 #include "deformable_ccd/MeshStamped.h"
 #include "input/mesh_decoder.h"
+#include "ros/support/bytes_of.h"
 #include "ros/support/meshes.h"
 #include "support/said.h"
 
@@ -33,7 +34,7 @@ class MessageGrammar : public ::testing::Test {
   template <typename Message>
   DecodedMesh read(const Message& message) {
     const MeshType& type = *findMeshType(ros::message_traits::datatype(message));
-    const std::vector<std::uint8_t> bytes = type.serialize(&message);
+    const std::vector<std::uint8_t> bytes = test::bytesOf(message);
     if (!decoder_) {
       decoder_.emplace(config);
       of_objects_.emplace(config);
@@ -44,7 +45,7 @@ class MessageGrammar : public ::testing::Test {
       const DecodedMesh same = of_objects_->decode(type.datatype, {}, object);
       EXPECT_EQ(0, std::memcmp(mesh.positions.data(), same.positions.data(), 24 * mesh.positions.size()));
       EXPECT_EQ(*mesh.topology, *same.topology);
-      EXPECT_EQ(mesh.row_step_remark, same.row_step_remark);
+      EXPECT_EQ(mesh.row_step_hint, same.row_step_hint);
       return mesh;
     } catch (const MeshError& error) {
       EXPECT_EQ(error.what(), test::said<MeshError>([&] { of_objects_->decode(type.datatype, {}, object); }));
@@ -133,7 +134,7 @@ TEST_F(CloudGrammar, Rows) {
   padded.row_step = 100;
   padded.data.insert(padded.data.begin() + 80, 20, 0x77);
   EXPECT_EQ(read(padded).positions, SQUARE) << "bytes between two rows";
-  EXPECT_EQ(read(padded).row_step_remark, "");
+  EXPECT_EQ(read(padded).row_step_hint, "");
   for (const std::uint32_t row_step : {0u, 79u, 101u, 200u}) {
     padded.row_step = row_step;
     EXPECT_TRUE(mentions(refusalOf(padded), "row_step " + std::to_string(row_step))) << "of data of 180 bytes";
@@ -142,7 +143,7 @@ TEST_F(CloudGrammar, Rows) {
   for (const std::uint32_t row_step : {0u, 4u, 1000u}) {
     one.row_step = row_step;
     EXPECT_EQ(read(one).positions, SQUARE) << "a single row needs none";
-    EXPECT_EQ(read(one).row_step_remark, "");
+    EXPECT_EQ(read(one).row_step_hint, "");
   }
 }
 
@@ -153,11 +154,11 @@ TEST_F(CloudGrammar, WrongRowSteps) {
     rows.row_step = row_step;
     const DecodedMesh mesh = read(rows);
     EXPECT_EQ(mesh.positions, SQUARE) << row_step;
-    EXPECT_TRUE(mentions(mesh.row_step_remark, "row_step " + std::to_string(row_step) + " contradicts"));
-    EXPECT_TRUE(mentions(mesh.row_step_remark, "publish row_step 80")) << mesh.row_step_remark;
+    EXPECT_TRUE(mentions(mesh.row_step_hint, "row_step " + std::to_string(row_step) + " contradicts"));
+    EXPECT_TRUE(mentions(mesh.row_step_hint, "publish row_step 80")) << mesh.row_step_hint;
   }
   rows.row_step = 80;
-  EXPECT_EQ(read(rows).row_step_remark, "");
+  EXPECT_EQ(read(rows).row_step_hint, "");
   rows.row_step = 160;
   for (const std::size_t bytes : {159u, 161u, 239u}) {
     rows.data.resize(bytes);

@@ -10,6 +10,7 @@
 #include "config/monitor_config.h"
 #include "input/mesh_decoder.h"
 #include "input/object_views.h"
+#include "ros/support/bytes_of.h"
 
 namespace dccd {
 namespace {
@@ -51,7 +52,7 @@ boost::shared_ptr<const Float64MultiArray> square() {
 TEST(MessageType, AToyIsDecodedFromBytesAndAsAnObject) {
   const MeshType& type = *findMeshType(TOY_TYPE);
   const auto message = square();
-  const std::vector<std::uint8_t> bytes = type.serialize(message.get());
+  const std::vector<std::uint8_t> bytes = test::bytesOf(*message);
   MeshDecoder decoder(gridInWorld());
   const DecodedMesh from_bytes = decoder.decode(TOY_TYPE, {bytes.data(), bytes.size()});
   const DecodedMesh from_object = decoder.decode(TOY_TYPE, {}, {&type, message});

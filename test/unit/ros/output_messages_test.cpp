@@ -36,10 +36,6 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
             "no contact found, but PARTIAL (2 vertices were lost), starts NOT_CHECKED");
   EXPECT_EQ(summaryOf(nothingFound(StepStatus::OK, StartState::INTERSECTING)),
             "no contact found, but starts INTERSECTING");
-  Outcome suppressed = nothingFound(StepStatus::OK, StartState::CLEAR);
-  suppressed.suppressed = 3;
-  suppressed.touching = Touching::LASTING;
-  EXPECT_EQ(summaryOf(suppressed), "no contact found, but 3 initial ones suppressed, starts CLEAR");
   Outcome doubtful = nothingFound(StepStatus::OK, StartState::CLEAR);
   doubtful.unproved = {"1 vertex is not finite"};
   EXPECT_EQ(summaryOf(doubtful), "no contact found, but 1 vertex is not finite, starts CLEAR");

@@ -29,9 +29,7 @@ TEST(Parameters, TheHashTellsLiveValuesApart) {
       [](MonitorConfig& c) { c.monitor.store.max_step_s = 0.25; },
       [](MonitorConfig& c) { c.monitor.store.max_vertex_step_m = 0.25; },
       [](MonitorConfig& c) { c.monitor.detector.max_contacts = 5; },
-      [](MonitorConfig& c) { c.monitor.detector.suppress_initial = true; },
       [](MonitorConfig& c) { c.markers.point_size_m = 0.02; },
-      [](MonitorConfig& c) { c.markers.normal_length_m = 0.02; },
       [](MonitorConfig& c) { c.markers.mesh = true; },
       [](MonitorConfig& c) { c.markers.obstacle_m = 0.02; },
   };

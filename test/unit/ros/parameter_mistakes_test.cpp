@@ -16,8 +16,8 @@ TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
       {"max_stp_s: 0.5", "~max_stp_s is not known; nearest is ~max_step_s"},
       {"topology: {rwos: 3}", "~topology/rwos is not known; nearest is ~topology/rows"},
       {"record_stesp: 3", "~record_stesp is not known; nearest is ~record_steps"},
-      {"record_directory: steps", "~record_directory is not known; nearest is ~record_folder"},
-      {"sensor_model: {mis: 0.3}", "~sensor_model/mis is not known; nearest is ~sensor_model/min"},
+      {"record_step: 1", "~record_step is not known; nearest is ~record_steps"},
+      {"sensor_model: {mis: 0.3}", "~sensor_model/mis is not known; nearest is ~sensor_model/miss"},
       {"clearance: {max: 1.0}", "~clearance/max is not known; nearest is ~clearance/max_m"},
       {"rows: 20", "~rows is not known; nearest is ~topology/rows"},
       {"bodies: {cloth: {topic: a, cols: 3}}",
@@ -52,8 +52,8 @@ TEST(Parameters, WhatAFileSaysInVainIsRefused) {
 
 TEST(Parameters, WrongTypesAreRefused) {
   expectMistakes({
-      {"tolerance_m: 1e-6", "~tolerance_m is a string"},
-      {"tolerance_m: 1e-6", "1.0e-6"},  // the usual mistake is named
+      {"rigid_tolerance_m: 1e-6", "~rigid_tolerance_m is a string"},
+      {"rigid_tolerance_m: 1e-6", "1.0e-6"},  // the usual mistake is named
       {"num_threads: 1.5", "integer"},
       {"topology: grid", "section"},
       {"clearance: true", "~clearance is a boolean, a section is needed"},
@@ -79,8 +79,12 @@ TEST(Parameters, ValuesOutOfRangeAreRefused) {
       {"bodies: {cloth: {minimum_separation_m: -1}}", "~bodies/cloth/minimum_separation_m is -1, it must be from 0"},
       {"minimum_separation_pairs: [{between: [mesh, mesh], separation_m: .nan}]",
        "minimum_separation_pairs[0]/separation_m is nan"},
-      {"clearance: {tolerance_m: 0}", "~clearance/tolerance_m is 0, it must be from 1e-09 to 1"},
-      {"clearance: {tolerance_m: .nan}", "~clearance/tolerance_m is nan"},
+      {"clearance: {tolerance_m: 0.01}", "~clearance/tolerance_m is gone: distances are known to 1e-4 m"},
+      {"toc_bits: 20", "~toc_bits is gone: a time of contact is known to 2^-32 of a step; remove it"},
+      {"bodies: {cloth: {weld: off}}", "~bodies/cloth/weld is gone: corners of triangles that coincide"},
+      {"max_vertices: 4", "~max_vertices is gone: a mesh has at most 1000000 vertices"},
+      {"sensor_model: {min: 0.2}", "~sensor_model/min is gone"},
+      {"robot: {description: d, scale: 2}", "~robot/scale is gone: scale single links by robot/links"},
       {"clearance: {max_m: -1}", "~clearance/max_m is -1, it must be from"},
       {"clearance: {max_m: .inf}", "~clearance/max_m is inf, it must be from"},
       {"clearance: {self_m: -0.5}", "~clearance/self_m is -0.5, it must be from"},
@@ -106,8 +110,8 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        "least 0.0012207"},
       {"obstacle_cloud_topics: [/a, {topic: /a}]", "~obstacle_cloud_topics has '/a' twice"},
       {"obstacle_cloud_topics: [{frame: /a}]", "~obstacle_cloud_topics/0/"},
-      {"obstacle_cloud_topics: [/a], obstacle_sensor_frame: b",
-       "~obstacle_sensor_frame has no place beside obstacle_cloud_topics"},
+      {"obstacle_sensor_frame: b",
+       "~obstacle_sensor_frame is gone: write obstacle_cloud_topics: [{topic: …, sensor_frame: …}]"},
       {"obstacle_min_range_m: 2.0, obstacle_max_range_m: 1.0",
        "~obstacle_min_range_m is 2, which leaves nothing of obstacle_max_range_m 1"},
       {"obstacle_no_return: clear", "~obstacle_no_return"},

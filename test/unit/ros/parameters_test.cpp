@@ -115,12 +115,10 @@ TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
 TEST(Parameters, DistancesHaveLimitsThatMarkersShowThemBy) {
   const MonitorConfig defaults = readConfig(XmlRpcValue());
   EXPECT_FALSE(defaults.monitor.detector.clearance.wanted) << "the plan of effects says so, in each step";
-  EXPECT_EQ(defaults.monitor.detector.clearance.tolerance_m, 1e-4);
   EXPECT_EQ(defaults.monitor.detector.clearance.max_m, 0.5);
   EXPECT_EQ(defaults.monitor.detector.clearance.self_m, 0);
   EXPECT_EQ(defaults.markers.clearance_max_m, 0.5);
-  const MonitorConfig given = readConfig(parameters("clearance: {tolerance_m: 0.001, max_m: 2, self_m: 0.25}"));
-  EXPECT_EQ(given.monitor.detector.clearance.tolerance_m, 1e-3);
+  const MonitorConfig given = readConfig(parameters("clearance: {max_m: 2, self_m: 0.25}"));
   EXPECT_EQ(given.monitor.detector.clearance.max_m, 2);
   EXPECT_EQ(given.monitor.detector.clearance.self_m, 0.25);
   EXPECT_EQ(given.markers.clearance_max_m, 2);
@@ -128,21 +126,22 @@ TEST(Parameters, DistancesHaveLimitsThatMarkersShowThemBy) {
 
 TEST(Parameters, OnAndOffAreWordsThoughYamlTakesThemForBooleans) {
   XmlRpcValue tree;
-  tree["weld"] = false;
+  tree["effects"]["body_body"] = false;
   tree["effects"]["octomap"] = true;
   const MonitorConfig config = readConfig(tree);
-  EXPECT_FALSE(config.bodies[0].input.weld);
+  EXPECT_EQ(config.effects.at(Effect::BODY_BODY), EffectSetting::OFF);
   EXPECT_EQ(config.effects.at(Effect::OCTOMAP), EffectSetting::ON);
 }
 
 TEST(Parameters, YamlReadsAsTheParameterServerWould) {
   const std::string file = ::testing::TempDir() + "monitor_parameters.yaml";
-  std::ofstream(file) << "fixed_frame: world\nmax_step_s: 1\nweld: off\ntopology: {source: grid, rows: 3, cols: 4}\n"
-                         "exclude_boxes: [[0, 0, 0, 1, 1.5, 1]]\n";
+  std::ofstream(file)
+      << "fixed_frame: world\nmax_step_s: 1\neffects: {octomap: off}\ntopology: {source: grid, rows: 3, cols: 4}\n"
+         "exclude_boxes: [[0, 0, 0, 1, 1.5, 1]]\n";
   const MonitorConfig config = readConfig(readYaml(file), "");
   EXPECT_EQ(config.fixed_frame, "world");
   EXPECT_EQ(config.monitor.store.max_step_s, 1);
-  EXPECT_FALSE(config.bodies[0].input.weld);
+  EXPECT_EQ(config.effects.at(Effect::OCTOMAP), EffectSetting::OFF);
   EXPECT_EQ(config.bodies[0].input.cols, 4u);
   EXPECT_EQ(config.monitor.detector.exclude_boxes.at(0).max.y(), 1.5);
   std::ofstream(file) << "max_step_s: [1\n";

@@ -10,10 +10,10 @@
 
 #include <deformable_ccd/MeshStamped.h>
 #include <gtest/gtest.h>
-#include <ros/serialization.h>
 
 #include "node/monitor_pipeline.h"
 #include "record/flight_recorder.h"
+#include "ros/support/bytes_of.h"
 #include "support/heap.h"
 #include "support/query_property.h"
 #include "support/recordings.h"
@@ -63,9 +63,7 @@ class Stream {
     }
     MeshMessage raw;
     raw.datatype = "deformable_ccd/MeshStamped";
-    raw.bytes.resize(ros::serialization::serializationLength(mesh));
-    ros::serialization::OStream out(raw.bytes.data(), static_cast<std::uint32_t>(raw.bytes.size()));
-    ros::serialization::serialize(out, mesh);
+    raw.bytes = test::bytesOf(mesh);
     return raw;
   }
 

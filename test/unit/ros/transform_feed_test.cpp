@@ -1,4 +1,4 @@
-// Transforms that cannot be used: left out, counted, and said once a child frame, with values and remedy.
+// Transforms that cannot be used: left out, counted, and said once a child frame, with values and hint.
 #include "input/transforms.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ TEST_F(TransformFeedTest, AQuaternionThatIsNoneIsSaidOnceWithItsValues) {
       "length 1";
   for (int k = 0; k < 3; ++k) {
     feed.add(turned("/finger", 1.2, 1 + k), k == 2);
-    EXPECT_EQ(feed.takeComplaints(), k == 0 ? std::vector<std::string>{said} : std::vector<std::string>{});
+    EXPECT_EQ(feed.takeProblems(), k == 0 ? std::vector<std::string>{said} : std::vector<std::string>{});
     EXPECT_EQ(feed.onlyUnusable(), said);
   }
   EXPECT_EQ(feed.unusable(), 3u);
@@ -43,7 +43,7 @@ TEST_F(TransformFeedTest, AQuaternionThatIsNoneIsSaidOnceWithItsValues) {
   EXPECT_EQ(feed.onlyUnusable(), "") << "now it has a place";
   feed.add(turned("finger", 0, 6), false);
   EXPECT_EQ(feed.onlyUnusable(), "") << "and keeps it";
-  EXPECT_TRUE(feed.takeComplaints().empty());
+  EXPECT_TRUE(feed.takeProblems().empty());
   EXPECT_EQ(feed.unusable(), 4u);
 }
 
@@ -60,19 +60,19 @@ TEST_F(TransformFeedTest, WhateverIsWrongIsNamed) {
   };
   for (const auto& [message, problem] : cases) {
     feed.add(message, false);
-    const std::vector<std::string> said = feed.takeComplaints();
+    const std::vector<std::string> said = feed.takeProblems();
     ASSERT_EQ(said.size(), 1u) << problem;
     EXPECT_NE(said[0].find(problem), std::string::npos) << said[0];
     EXPECT_LT(said[0].size(), 1000u);
   }
   // What two tools round apart is taken as tf2 takes it.
   feed.add(turned("h", 1.004, 1), false);
-  EXPECT_TRUE(feed.takeComplaints().empty());
+  EXPECT_TRUE(feed.takeProblems().empty());
 }
 
 TEST_F(TransformFeedTest, AFloodOfNamesIsToldOfInPartAndCountedWhole) {
   for (int k = 0; k < 1000; ++k) feed.add(turned("frame" + std::to_string(k), 1.5, 1), false);
-  EXPECT_EQ(feed.takeComplaints().size(), TransformFeed::MAX_TOLD);
+  EXPECT_EQ(feed.takeProblems().size(), TransformFeed::MAX_TOLD);
   EXPECT_EQ(feed.unusable(), 1000u);
 }
 
@@ -179,13 +179,13 @@ TEST_F(TransformFeedTest, AFrameOnBothTopicsHasNoPlaceUnlessTheyAgree) {
     feed.add(turned(tool, 1, 1.5, 3.0005), !static_first);
     EXPECT_TRUE(feed.lookup("world", "tip of " + tool, 1000000000, pose, reason)) << reason;
     EXPECT_EQ(pose.translation().x(), 4);
-    EXPECT_TRUE(feed.takeComplaints().empty());
+    EXPECT_TRUE(feed.takeProblems().empty());
     feed.add(turned(tool, 1, 2, 3.5), !static_first);
     EXPECT_FALSE(feed.lookup("world", "tip of " + tool, 1000000000, pose, reason));
     EXPECT_EQ(reason, "'" + tool + "' is on /tf and, elsewhere, on /tf_static");
     EXPECT_FALSE(feed.lookup(tool, "world", 0, pose, reason)) << "the newest one, too";
     EXPECT_TRUE(feed.lookup(tool, "tip of " + tool, 1000000000, pose, reason)) << reason;
-    ASSERT_EQ(feed.takeComplaints().size(), 1u);
+    ASSERT_EQ(feed.takeProblems().size(), 1u);
   }
 }
 

@@ -1,5 +1,5 @@
 // The choice of the SIMD target: whoever asks which there are changes nothing.
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 
 #include <gtest/gtest.h>
 

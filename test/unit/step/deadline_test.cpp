@@ -1,4 +1,4 @@
-#include "dccd/deadline.h"
+#include "dccd/types.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dccd/simd_target.h"
+#include "dccd/monitor_extras.h"
 #include "support/looks.h"
 #include "support/shapes.h"
 

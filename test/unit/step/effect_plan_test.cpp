@@ -1,4 +1,4 @@
-#include "dccd/effect_plan.h"
+#include "base/effect_plan.h"
 
 #include <gtest/gtest.h>
 

@@ -102,8 +102,8 @@ TEST(FloatMode, OfTheCallerChangesNoLaterAnswer) {
     const RoundingMode rounding(mode);
     detect(cloth, options, history);
     EXPECT_EQ(std::fegetround(), mode);
-    const LeftOutOfBody& left_out = history.impl().prepared.left_out.of_body[0];
-    const SceneBody& ranks = history.impl().scene.bodies()[0];
+    const LeftOutOfBody& left_out = History::Impl::of(history).prepared.left_out.of_body[0];
+    const SceneBody& ranks = History::Impl::of(history).scene.bodies()[0];
     const Index vertices = static_cast<Index>(body.t0->size());
     const Index edges = static_cast<Index>(body.topology->edges().size());
     const Index faces = static_cast<Index>(body.topology->faces().size());

@@ -19,7 +19,7 @@ namespace {
 /// All that could be carried over, taken apart.
 void expectFresh(History& history) {
   History fresh;
-  const Carried &now = history.impl().carried, &then = fresh.impl().carried;
+  const Carried &now = History::Impl::of(history).carried, &then = History::Impl::of(fresh).carried;
   EXPECT_EQ(now.end, then.end);
   EXPECT_EQ(now.apart, then.apart);
   EXPECT_TRUE(then.start_state.isClear());
@@ -167,7 +167,7 @@ struct ClothStream {
     ++frames;
     return outcome;
   }
-  History& history() { return monitor.impl().history; }
+  History& history() { return Monitor::Impl::of(monitor).history; }
 
   const Step scene;
   Monitor monitor{options(), bodies()};

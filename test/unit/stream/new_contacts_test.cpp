@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "dccd/assurance.h"
-#include "dccd/new_contacts.h"
+#include "dccd/monitor_extras.h"
 #include "unit/stream/monitor_support.h"
 #include "unit/stream/patch_stream.h"
 

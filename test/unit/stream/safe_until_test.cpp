@@ -1,6 +1,6 @@
 // Until when nothing can touch, whether that was kept, and how fast one may go: from distances that are written by
 // hand.
-#include "dccd/safe_until.h"
+#include "dccd/monitor_extras.h"
 
 #include <gtest/gtest.h>
 

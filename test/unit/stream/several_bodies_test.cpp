@@ -94,7 +94,7 @@ TEST_F(TwoBodies, PosesOfWhatIsHeldAreNotKeptForStepsThatNeverCome) {
       two.push(0, floor((100 * k + 100) * MS, k % 2), NOW);
       Outcome outcome;
       while (two.next(LATER, outcome)) EXPECT_FALSE(outcome.answered);
-      ASSERT_LT(two.impl().map_seen.at("odom").size(), 100u) << "after " << k << " frames";
+      ASSERT_LT(Monitor::Impl::of(two).map_seen.at("odom").size(), 100u) << "after " << k << " frames";
     }
   }
 }

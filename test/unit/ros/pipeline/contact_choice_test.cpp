@@ -39,18 +39,6 @@ TEST(VertexMask, AMaskedVertexAndAnExcludedBoxMeetNothing) {
   EXPECT_EQ(met, (std::set<Index>{2, 3}));
 }
 
-TEST(InitialContacts, AreSuppressedByChoiceAndCounted) {
-  XmlRpcValue tree = scene();
-  tree["initial_contacts"] = "suppress";
-  Driven driven(tree);
-  driven.giveMap(1);
-  driven.feed(1, -0.05f);
-  const Outcome& outcome = driven.feed(1.1, -0.06f);
-  EXPECT_TRUE(outcome.answered && outcome.contacts.empty()) << "all of it has been inside from the start";
-  EXPECT_GT(outcome.suppressed, 0u);
-  EXPECT_FALSE(assuranceOf(outcome).clear());
-}
-
 XmlRpcValue expecting(const std::string& phase = "") {
   XmlRpcValue tree = scene();
   XmlRpcValue entry;

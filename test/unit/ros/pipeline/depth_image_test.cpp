@@ -76,8 +76,8 @@ TEST(DepthImage, ACameraThatSeesNothingIsNoSurfaceAndNoAnswer) {
   scene.see(1, {0, 0, 0, 0, 0, 0, 0, 0});
   scene.see(1.05, {NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH, NO_DEPTH});
   EXPECT_EQ(scene.pipeline.monitor().counters(1).of(StepStatus::BAD_MESSAGE), 1u);
-  const std::string complaint = scene.pipeline.takeComplaint(1);
-  EXPECT_NE(complaint.find("no three of the 64 kept pixels"), std::string::npos) << complaint;
+  const std::string problem = scene.pipeline.takeProblem(1);
+  EXPECT_NE(problem.find("no three of the 64 kept pixels"), std::string::npos) << problem;
   EXPECT_EQ(scene.feed(1.1, 0.3f).status, StepStatus::NO_BODY);
   scene.see(1.15, {0, 0, 0, 0, 0, 0, 0, 0});
   scene.feed(1.2, 0.3f);

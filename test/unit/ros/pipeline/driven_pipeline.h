@@ -14,18 +14,11 @@
 
 #include "node/map_loader.h"
 #include "node/monitor_pipeline.h"
+#include "ros/support/bytes_of.h"
 #include "unit/ros/parameter_support.h"
 
 namespace dccd {
 namespace test {
-
-template <typename Message>
-std::vector<std::uint8_t> bytesOf(const Message& message) {
-  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  ros::serialization::serialize(stream, message);
-  return bytes;
-}
 
 /// Numbers of 4 bytes each, one behind the other.
 inline void addFields(const std::vector<std::string>& names, sensor_msgs::PointCloud2& cloud) {

@@ -475,9 +475,9 @@ TEST(Map, ThatIsOlderThanAllOfTfIsPlacedByTheFirstTransform) {
   scene.offer(0.15, 0.05f, 2000000000);
   EXPECT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
   EXPECT_TRUE(scene.outcome.obstacle);
-  const std::string note = scene.pipeline.takeMapNote();
+  const std::string note = scene.pipeline.takeMapHint();
   EXPECT_NE(note.find("it is placed by the first, 60.1 s after its stamp"), std::string::npos) << note;
-  EXPECT_EQ(scene.pipeline.takeMapNote(), "");
+  EXPECT_EQ(scene.pipeline.takeMapHint(), "");
   scene.offer(0.2, -0.6f, 2000000000);
   EXPECT_FALSE(scene.outcome.contacts.empty()) << "its top is at -0.5";
 }

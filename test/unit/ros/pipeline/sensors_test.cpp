@@ -245,11 +245,11 @@ TEST(Sensors, ACloudInTheMapsOwnFrameTellsWhereItsSensorWas) {
   Camera lost;
   EXPECT_TRUE(says(lost.whyNot(inWorld("")),
                    "the cloud was refused: it comes in the map's own frame 'world', which does not tell where the "
-                   "sensor was, so that it fills and clears nothing; set obstacle_sensor_frame"));
+                   "sensor was, so that it fills and clears nothing; name the sensor's frame by sensor_frame"));
   EXPECT_EQ(lost.add(pointsOf(1, tableDepth, false)).surface, nullptr) << "that of another name was refused";
   EXPECT_TRUE(says(lost.whyNot(inWorld("torn")), "its points were seen from different places"));
   for (const bool by_fields : {false, true}) {
-    Camera camera(by_fields ? "" : "obstacle_sensor_frame: camera");
+    Camera camera(by_fields ? "" : "obstacle_cloud_topics: [{topic: /points, sensor_frame: camera}]");
     const LoadedMap map = camera.add(inWorld(by_fields ? "whole" : ""));
     ASSERT_TRUE(map.surface) << map.problem;
     EXPECT_EQ(keysOf(*map.surface), keysOf(*own.surface)) << by_fields;
@@ -257,7 +257,7 @@ TEST(Sensors, ACloudInTheMapsOwnFrameTellsWhereItsSensorWas) {
 }
 
 TEST(Sensors, WhatIsSeenThroughFromTheNamedSensorIsCleared) {
-  Camera camera("obstacle_sensor_frame: camera");
+  Camera camera("obstacle_cloud_topics: [{topic: /points, sensor_frame: camera}]");
   const auto inWorld = [](std::array<float, 3> p) { return cloudOf(1, {p}, "world"); };
   EXPECT_EQ(camera.add(inWorld({0.05f, 0.05f, 0.55f})).surface->leafCount(), 1u);
   for (int i = 0; i < 2; ++i) camera.add(inWorld({0.05f, 0.05f, 0.05f}));
@@ -276,13 +276,13 @@ TEST(Sensors, NoReturnIsAMapAndClearsIfSaid) {
     for (int i = 0; i < 4; ++i) map = camera.add(pictureOf(1, far));
     ASSERT_TRUE(map.surface) << "a picture of which nothing came back is one: " << map.problem;
     EXPECT_EQ(map.surface->leafCount(), clears ? 0 : before);
-    EXPECT_EQ(map.note, clears ? ""
+    EXPECT_EQ(map.hint, clears ? ""
                                : "the clouds on /camera/points have infinite points: nothing came back from there, and "
                                  "what was seen there before stays; obstacle_no_return: clears takes it away");
     camera.give(std::move(map));
-    EXPECT_EQ(camera.pipeline.takeMapNote().empty(), clears);
+    EXPECT_EQ(camera.pipeline.takeMapHint().empty(), clears);
     camera.give(camera.add(pictureOf(1, far)));
-    EXPECT_EQ(camera.pipeline.takeMapNote(), "") << "it is said once";
+    EXPECT_EQ(camera.pipeline.takeMapHint(), "") << "it is said once";
     EXPECT_EQ(camera.feed(1, 0.35f).status, StepStatus::FIRST_FRAME);
     EXPECT_EQ(camera.feed(1.1, 0.35f).status, StepStatus::OK) << camera.outcome.reason;
   }
@@ -498,7 +498,7 @@ TEST(Sensors, WhatTakesTooLongIsSaidInPlaceOfTheRate) {
   camera.give(std::move(map));
   camera.feed(3, 0.9f);
   EXPECT_EQ(camera.feed(3.1, 0.9f).status, StepStatus::NO_MAP) << "the map is too old by now";
-  EXPECT_EQ(camera.pipeline.statement().remedy, "a cloud on /camera/points takes 700 ms to become part of the map");
+  EXPECT_EQ(camera.pipeline.statement().hint, "a cloud on /camera/points takes 700 ms to become part of the map");
 }
 
 }  // namespace

@@ -26,18 +26,18 @@ TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   EXPECT_FALSE(scene.pipeline.nextOutcome(0, scene.outcome));
   EXPECT_FALSE(scene.pipeline.idle(Tabled::TABLE)) << "a newer one waits its turn at first";
   EXPECT_FALSE(scene.pipeline.nextOutcome(SECOND_NS, scene.outcome)) << "nobody knows the fixed frame yet";
-  EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "which is no mistake";
+  EXPECT_EQ(scene.pipeline.takeProblem(Tabled::TABLE), "") << "which is no mistake";
 
   scene.take(Tabled::CLOTH, 2, 0.3f, 2 * SECOND_NS);
   ASSERT_TRUE(scene.pipeline.nextOutcome(2 * SECOND_NS, scene.outcome));
-  const std::string complaint = scene.pipeline.takeComplaint(Tabled::TABLE);
-  EXPECT_EQ(complaint.rfind("waits: no transform from 'table' to 'world'", 0), 0u) << complaint;
+  const std::string problem = scene.pipeline.takeProblem(Tabled::TABLE);
+  EXPECT_EQ(problem.rfind("waits: no transform from 'table' to 'world'", 0), 0u) << problem;
   scene.take(Tabled::CLOTH, 2.1, 0.3f, 3 * SECOND_NS);
   scene.pipeline.nextOutcome(3 * SECOND_NS, scene.outcome);
   ASSERT_TRUE(scene.pipeline.nextOutcome(4 * SECOND_NS, scene.outcome));
   EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
   EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'table' to 'world'", 0), 0u) << scene.outcome.reason;
-  EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "said once";
+  EXPECT_EQ(scene.pipeline.takeProblem(Tabled::TABLE), "") << "said once";
   EXPECT_EQ(scene.pipeline.checkNow().reason, scene.outcome.reason);
   EXPECT_EQ(scene.tables().waiting(), 1u);
 

@@ -141,7 +141,7 @@ TEST_F(RobotModel, WhatOthersWriteBesideSurfacesIsPassedOver) {
   ASSERT_EQ(robot.parts.size(), 1u);
   EXPECT_EQ(robot.parts[0].name, "base");
   EXPECT_EQ(
-      joinedText(robot.remarks),
+      joinedText(robot.hints),
       "not watched, for they have a visual but no collision element (robot/visuals: true takes the visual): links "
       "'seen'\n"
       "without geometry are links 'world'\n");
@@ -191,7 +191,7 @@ TEST_F(RobotModel, AVisualStandsForACollisionElement) {
       robotFrom(robotOf(link("seen", visual + visual) + link("both", visual + collision("<box size='1 1 1'/>")) +
                         joint("seen", "both")),
                 "", config);
-  EXPECT_EQ(joinedText(robot.missing) + joinedText(robot.remarks), "");
+  EXPECT_EQ(joinedText(robot.missing) + joinedText(robot.hints), "");
   ASSERT_EQ(robot.parts.size(), 3u);
   EXPECT_TRUE(hasVertex(partOf(robot, "seen/2"), Vec3(2, 1, 1), 1e-15));
   EXPECT_TRUE(hasVertex(partOf(robot, "both"), Vec3(0.5, 0.5, 0.5), 0));
@@ -321,10 +321,10 @@ TEST_F(RobotModel, ATextThatIsNoUrdfIsNamedWithItsPlace) {
 TEST_F(RobotModel, AMeshInMillimetresIsHintedAt) {
   const std::string urdf =
       robotOf(link("a", collision("<mesh filename='" + tetrahedron("t.stl") + "' scale='9 9 9'/>")));
-  EXPECT_TRUE(says(robotFrom(urdf).remarks,
+  EXPECT_TRUE(says(robotFrom(urdf).hints,
                    "link 'a' is 33.6749 m across: if its mesh is in millimetres, write "
                    "scale=\"0.001 0.001 0.001\" beside its filename"))
-      << joinedText(robotFrom(urdf).remarks);
+      << joinedText(robotFrom(urdf).hints);
 }
 
 TEST_F(RobotModel, WhatIsLeftOutIsNotRead) {

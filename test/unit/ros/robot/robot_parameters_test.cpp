@@ -168,7 +168,6 @@ TEST(RobotParameters, MistakesAreNamed) {
       {"robot: {padding_m: 1}\n", "robot/description is needed"},
       {"robot: {description: d, paddding_m: 1}\n", "robot/paddding_m is not known; nearest is robot/padding_m"},
       {"robot: {description: d, padding_m: -1}\n", "robot/padding_m is -1"},
-      {"robot: {description: d, scale: 0}\n", "robot/scale is 0"},
       {"robot: {description: d, max_own_voxels: -1}\n", "robot/max_own_voxels is -1"},
       {"robot: {description: d, links: {pall: {scale: 2}}}\n",
        "robot/links/pall is no link of the robot; nearest is 'palm'"},

@@ -84,9 +84,8 @@ TEST_F(RobotPipeline, ALinkWithoutTransformIsNamedAndTheRestGoesOn) {
   EXPECT_FALSE(unproved("'palm'"));
   ASSERT_FALSE(driven_->outcome.contacts.empty());
   EXPECT_EQ(driven_->outcome.contacts[0].body[1], 1) << "the palm's";
-  const std::string complaint = driven_->pipeline.takeComplaint(2);
-  EXPECT_NE(complaint.find("not watched meanwhile: no transform from 'thumb' to 'world'"), std::string::npos)
-      << complaint;
+  const std::string problem = driven_->pipeline.takeProblem(2);
+  EXPECT_NE(problem.find("not watched meanwhile: no transform from 'thumb' to 'world'"), std::string::npos) << problem;
   // It comes back: the step that began without it is not proved, the next one is.
   for (const double at : {1.2, 1.3}) {
     put("palm", at, 0.1);
@@ -96,12 +95,12 @@ TEST_F(RobotPipeline, ALinkWithoutTransformIsNamedAndTheRestGoesOn) {
   EXPECT_TRUE(unproved("where body 'thumb' was is not known")) << joinedText(driven_->outcome.unproved);
   feed(1.3, 0.3f);
   EXPECT_TRUE(assuranceOf(driven_->outcome).clear()) << joinedText(driven_->outcome.unproved);
-  EXPECT_EQ(driven_->pipeline.takeComplaint(2), "");
+  EXPECT_EQ(driven_->pipeline.takeProblem(2), "");
   // And is lost again.
   put("palm", 1.4, 0.1);
   feed(1.4, 0.3f);
   EXPECT_TRUE(unproved("where body 'thumb' was is not known"));
-  EXPECT_NE(driven_->pipeline.takeComplaint(2), "");
+  EXPECT_NE(driven_->pipeline.takeProblem(2), "");
 }
 
 // Until its time is up, a frame waits for the last link.

@@ -26,7 +26,7 @@ TEST(Srdf, GroupsAreLinksChainsJointsAndGroups) {
               "<virtual_joint name='virtual' type='fixed' parent_frame='world' child_link='base'/>"
               "<group_state name='x' group='arm'/><passive_joint name='y'/><link_sphere_approximation link='z'/>"
               "<disable_collisions link1='base' link2='arm' reason='Adjacent'/>"));
-  EXPECT_EQ(joinedText(robot.missing) + joinedText(robot.remarks),
+  EXPECT_EQ(joinedText(robot.missing) + joinedText(robot.hints),
             "without geometry are links 'arm', 'base', 'finger', 'thumb', 'wrist'\n");
   EXPECT_EQ(robot.groups.at("arm"), (Names{"arm", "wrist"})) << "no joint of the chain moves its base";
   EXPECT_EQ(robot.groups.at("hand"), (Names{"palm", "finger"}));
@@ -72,7 +72,7 @@ TEST(Srdf, UnknownLinksAndJointsAreNamed) {
   for (const char* expected :
        {"test.srdf: <link> of line 2 names the link 'pall', which the robot does not have", "names the joint 'turn'",
         "<chain> of line 2 names the link 'tip'", "<disable_collisions> of line 2 names the link 'cover'"}) {
-    EXPECT_TRUE(says(robot.remarks, expected)) << joinedText(robot.remarks);
+    EXPECT_TRUE(says(robot.hints, expected)) << joinedText(robot.hints);
   }
 }
 

@@ -1,4 +1,4 @@
-#include "apps/make_scene_bag/physics/shapes.h"
+#include "scenes/physics/shapes.h"
 
 #include <algorithm>
 #include <cmath>

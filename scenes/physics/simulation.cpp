@@ -1,4 +1,4 @@
-#include "apps/make_scene_bag/physics/simulation.h"
+#include "scenes/physics/simulation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
-#include "apps/make_scene_bag/physics/shapes.h"
+#include "scenes/physics/shapes.h"
 
 namespace dccd::scene {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "apps/make_scene_bag/physics/scene_spec.h"
 #include "config/parameter_reader.h"
+#include "scenes/physics/scene_spec.h"
 
 namespace dccd::scene {
 

@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "apps/make_scene_bag/physics/scene_spec.h"
+#include "scenes/physics/scene_spec.h"
 
 namespace dccd::scene {
 

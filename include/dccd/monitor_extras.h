@@ -1,6 +1,8 @@
-// Until when nothing can touch, and how fast one may go: what follows from a step's distances and bounds on speeds.
+// What a monitor of a stream needs besides its answers: until when nothing can touch, and how fast one may go; what of
+// an answer is news; and the SIMD target of the process.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -140,5 +142,38 @@ struct SpeedScale {
 /// unexpected touches anew, be it a body and itself. What else stands in the way of a proof (Assurance) is the caller's
 /// matter. Throws as safeUntil() does, and names a number of the law that is not finite or below 0.
 DCCD_EXPORT SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds, const SpeedLaw& law);
+
+// --- news: contacts that are not expected and belong to no patch that lasts. Alarms are about these. ---
+
+/// The earliest new contact of a pair of partners.
+struct NewContact {
+  std::array<std::uint16_t, 2> body{0, 0};  ///< as in Patch
+  std::uint64_t patch = 0;                  ///< identity of its patch; 0: of a prediction, or without patches
+  Contact contact;
+};
+
+/// The first touch of a new patch that is not expected is not before this, [1] of the step: 0 where surfaces cross.
+inline double newsTocLower(const Patch& patch) { return patch.crossings > 0 ? 0 : patch.earliest.toc_lower; }
+
+/// One for each pair of partners, the earliest first; of one time in canonical order. Of patches that are new
+/// (Patch::is_new) or, where none are tracked, of all contacts that are not expected. Of a patch that is new by edges
+/// that cross faces when the step begins alone there is none.
+DCCD_EXPORT std::vector<NewContact> newContacts(const Outcome& outcome);
+
+/// Not after the first of them, nor after what was left unchecked: [1] of the step; infinity: neither is there. 0 where
+/// surfaces cross that is new, or not expected where patches are not tracked.
+DCCD_EXPORT double earliestNewToc(const Outcome& outcome);
+
+// --- the SIMD target of the process: the best that the processor has, or a named one for tests and measurements ---
+
+/// Names of the targets that this build and this processor share, best first, e.g. AVX2, SSE4, SSSE3.
+DCCD_EXPORT std::vector<std::string> simdTargets();
+
+/// The name of the target in use.
+DCCD_EXPORT std::string simdTarget();
+
+/// "auto" or one of simdTargets(). Process-wide: call it at start, before any work. Answers do not depend on it.
+/// Throws std::invalid_argument naming the value and the usable ones.
+DCCD_EXPORT void setSimdTarget(const std::string& name);
 
 }  // namespace dccd

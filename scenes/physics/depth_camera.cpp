@@ -1,10 +1,10 @@
-#include "apps/make_scene_bag/physics/depth_camera.h"
+#include "scenes/physics/depth_camera.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "apps/make_scene_bag/physics/shapes.h"
+#include "scenes/physics/shapes.h"
 
 namespace dccd::scene {
 namespace {

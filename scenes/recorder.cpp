@@ -1,4 +1,4 @@
-#include "apps/make_scene_bag/recorder.h"
+#include "scenes/recorder.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,13 +12,13 @@
 #include <sensor_msgs/JointState.h>
 #include <boost/make_shared.hpp>
 
-#include "apps/make_scene_bag/messages.h"
-#include "apps/make_scene_bag/physics/depth_camera.h"
-#include "apps/make_scene_bag/physics/shapes.h"
-#include "apps/make_scene_bag/physics/simulation.h"
 #include "apps/output_bag.h"
-#include "dccd/cloud_map.h"
+#include "base/cloud_map.h"
 #include "report/progress_bar.h"
+#include "scenes/messages.h"
+#include "scenes/physics/depth_camera.h"
+#include "scenes/physics/shapes.h"
+#include "scenes/physics/simulation.h"
 
 namespace dccd {
 namespace {

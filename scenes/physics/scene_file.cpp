@@ -1,9 +1,9 @@
-#include "apps/make_scene_bag/physics/scene_file.h"
+#include "scenes/physics/scene_file.h"
 
 #include <algorithm>
 #include <numeric>
 
-#include "apps/make_scene_bag/physics/shapes.h"
+#include "scenes/physics/shapes.h"
 
 namespace dccd::scene {
 namespace {

@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "base/octomap_decode.h"
 #include "dccd/export.h"
-#include "dccd/octomap_decode.h"
 #include "dccd/types.h"
 
 namespace dccd {

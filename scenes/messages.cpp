@@ -1,4 +1,4 @@
-#include "apps/make_scene_bag/messages.h"
+#include "scenes/messages.h"
 
 #include <algorithm>
 #include <cstring>
@@ -7,8 +7,8 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_eigen/tf2_eigen.h>
 
-#include "apps/make_scene_bag/physics/shapes.h"
 #include "octomap/map_builder.h"
+#include "scenes/physics/shapes.h"
 
 namespace dccd {
 namespace {

@@ -1,7 +1,7 @@
 // A scene's robot: what its URDF says of it.
 #pragma once
 
-#include "apps/make_scene_bag/physics/scene_spec.h"
+#include "scenes/physics/scene_spec.h"
 
 namespace dccd {
 

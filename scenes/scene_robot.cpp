@@ -1,4 +1,4 @@
-#include "apps/make_scene_bag/scene_robot.h"
+#include "scenes/scene_robot.h"
 
 #include <algorithm>
 #include <set>

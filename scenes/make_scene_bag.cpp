@@ -8,12 +8,12 @@
 #include <CLI/CLI.hpp>
 
 #include "apps/decimal_options.h"
-#include "apps/make_scene_bag/physics/scene_file.h"
-#include "apps/make_scene_bag/recorder.h"
-#include "apps/make_scene_bag/scene_robot.h"
 #include "config/monitor_config.h"
 #include "node/monitor_pipeline.h"
 #include "node/robot_source.h"
+#include "scenes/physics/scene_file.h"
+#include "scenes/recorder.h"
+#include "scenes/scene_robot.h"
 
 namespace {
 

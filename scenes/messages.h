@@ -10,7 +10,7 @@
 #include <tf2_msgs/TFMessage.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include "apps/make_scene_bag/physics/scene_spec.h"
+#include "scenes/physics/scene_spec.h"
 
 namespace dccd {
 

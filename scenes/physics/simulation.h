@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/make_scene_bag/physics/scene_spec.h"
+#include "scenes/physics/scene_spec.h"
 
 namespace dccd::scene {
 
