@@ -288,7 +288,7 @@ TEST(Sensors, NoReturnIsAMapAndClearsIfSaid) {
   }
   Camera lidar("obstacle_no_return: clears");
   lidar.add(pointsOf(1, tableDepth, false));
-  EXPECT_TRUE(says(lidar.add(cloudOf(1, {{0, 0, 1}, {NO_RETURN, NO_RETURN, NO_RETURN}})).note,
+  EXPECT_TRUE(says(lidar.add(cloudOf(1, {{0, 0, 1}, {NO_RETURN, NO_RETURN, NO_RETURN}})).hint,
                    "they are no pixels in rows, and nobody knows where these looked"));
 }
 
