@@ -20,7 +20,7 @@ import yaml
 
 CHECKOUT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 RESOLUTION_M = 0.02
-OCTOMAP, TRUTH_TOPIC, MAP_TOPIC = "octomap", "/truth/octomap", "/octomap_binary"
+OCTOMAP, TRUTH_TOPIC, MAP_TOPIC, CLOUD_TOPIC = "octomap", "/truth/octomap", "/octomap_binary", "/camera/points"
 # Where each scene's camera is and what floor it looks down at. The cell was seen before the bodies came, twice: were it seen more often,
 # what was free would need several hits to be occupied, and the map would show the bodies late.
 CAMERA = {"width": 120, "height": 90, "lost_share": 0.02, "empty_clouds": 2}
@@ -39,6 +39,7 @@ CELLS = {
 SETTINGS = [{"noise_m": 0.003, "lag_s": 0.1, "rate_hz": 5.0}]
 for name, values in (("noise_m", (0.0, 0.01)), ("lag_s", (0.0, 0.3)), ("rate_hz", (10.0, 30.0))):
     SETTINGS += [{**SETTINGS[0], name: value} for value in values]
+FLYING_SHARE = 0.001  # of the pixels, along edges
 LONGEST_TRAVEL_S = 0.5  # what barely moves may be as late as this
 GAP_S = 0.25            # what comes back within this had not gone: patch_gap_s
 COLUMNS = ("scene", "noise mm", "lag s", "maps/s", "own", "clear", "of true", "alarms true", "false", "false before", "missed",
@@ -53,9 +54,12 @@ MEANING = """The columns are of contacts with the map:
 - *blind*: share of the voxels shown as own or in doubt that the true map has.
 """
 
+FLYING_HEAD = """| the monitor's own map | proved %, no pixel flies | 0.1 % fly along edges | costs, at most 1 |
+|---|--:|--:|--:|"""
+
 Contact = collections.namedtuple("Contact", "time_s point patch speed_m_per_s body")
 Step = collections.namedtuple("Step", "start_s end_s clear contacts")
-Run = collections.namedtuple("Run", "steps alarms own")
+Run = collections.namedtuple("Run", "steps alarms own proved_percent")
 
 
 def derived_page(scene, setting):
@@ -90,6 +94,8 @@ def analyse(tools, bag, monitor, folder, name, shows_own=False):
     run_tool(tools, "analyze_bag", bag, "--params", params, "--output", results, "--report", report, "--quiet")
     with open(os.path.join(report, "steps.csv"), newline="") as stream:
         clear = {int(row["stamp_ns"]): row["clear"] == "1" for row in csv.DictReader(stream) if row["answered"] == "1"}
+    with open(os.path.join(report, "report.json")) as stream:
+        proof = json.load(stream)["proof"]
     steps, alarms, own = [], set(), []
     with rosbag.Bag(results) as stream:
         # Markers are long, and nobody asks for those of bodies without own voxels.
@@ -105,7 +111,7 @@ def analyse(tools, bag, monitor, folder, name, shows_own=False):
                 alarms.update(p.id for p in message.patches if p.is_new and OCTOMAP in p.bodies)
             elif topic.endswith("/markers"):
                 own += [(p.x, p.y, p.z) for m in message.markers if m.ns == "own" for p in m.points]
-    return Run(steps, alarms, own)
+    return Run(steps, alarms, own, 100 * proof["proved"] / max(1, proof["steps"]))
 
 
 class Touches:
@@ -194,6 +200,17 @@ def judge(truth, run, truth_voxels, resolution_m):
     return row
 
 
+def measure_flying(tools, scene, own, folder):
+    """The share of the steps that are proved where the monitor makes the map of the clouds, without and with flying pixels, as a line."""
+    proved = []
+    for share in (0.0, FLYING_SHARE):
+        page, monitor, bag = record(tools, scene, {**SETTINGS[0], "flying_share": share}, folder)
+        del monitor["octomap_topic"]
+        monitor.update(own or {}, obstacle_cloud_topic=CLOUD_TOPIC, obstacle_resolution_m=page["obstacle"]["resolution_m"])
+        proved.append(analyse(tools, bag, monitor, folder, "flying").proved_percent)
+    return "| %s | %.1f | %.1f | %.1f |" % (scene, *proved, proved[0] - proved[1])
+
+
 def occupied_voxels(solids, resolution_m):
     """The voxels whose middles lie in boxes or rings, as make_scene_bag maps them."""
     voxels = set()
@@ -217,16 +234,22 @@ def occupied_voxels(solids, resolution_m):
     return voxels
 
 
+def record(tools, scene, setting, folder):
+    """A scene's page, its monitor and its bag."""
+    page, monitor = derived_page(scene, setting)
+    paths = page_path, bag = [os.path.join(folder, scene + ending) for ending in (".yaml", ".bag")]
+    with open(page_path, "w") as stream:
+        yaml.safe_dump(page, stream)
+    run_tool(tools, "make_scene_bag", *paths, "--quiet")
+    return page, monitor, bag
+
+
 def measure(tools, scene, own, folder):
     """The rows of a scene."""
     rows, truth = [], None
     for setting in SETTINGS:
-        page, monitor = derived_page(scene, setting)
+        page, monitor, bag = record(tools, scene, setting, folder)
         resolution_m = page["obstacle"]["resolution_m"]
-        paths = page_path, bag = [os.path.join(folder, scene + ending) for ending in (".yaml", ".bag")]
-        with open(page_path, "w") as stream:
-            yaml.safe_dump(page, stream)
-        run_tool(tools, "make_scene_bag", *paths, "--quiet")
         if truth is None:  # the motion does not depend on the camera
             truth = analyse(tools, bag, {**monitor, "octomap_topic": TRUTH_TOPIC}, folder, "truth")
             voxels = occupied_voxels(page["obstacle"]["solids"], resolution_m)
@@ -284,9 +307,10 @@ def main():
     os.makedirs(a.out, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         rows = [row for scene in a.scenes for row in measure(a.tools, scene, own, folder)]
+        flying = [measure_flying(a.tools, scene, own, folder) for scene in a.scenes]
     with open(os.path.join(a.out, "cell.json"), "w") as stream:
         json.dump(rows, stream, indent=1)
-    text = markdown(rows) + ("\n" + required(rows) if own else "")
+    text = "\n".join([markdown(rows), FLYING_HEAD, *flying, ""]) + ("\n" + required(rows) if own else "")
     with open(os.path.join(a.out, "cell.md"), "w") as stream:
         stream.write(text)
     print(text, end="")

@@ -167,6 +167,25 @@ double DepthCamera::gaussian() {  // Box and Muller
   return radius * std::cos(2.0 * M_PI * uniform());
 }
 
+/// Pixels beside an edge of its row get a range between the two of the edge.
+void DepthCamera::makeFly(Ranges& ranges) {
+  constexpr double EDGE_M = 0.05;
+  std::vector<std::size_t> edges;
+  for (std::size_t pixel = 0; pixel < ranges.size(); ++pixel) {
+    const bool has_left = pixel % static_cast<std::size_t>(camera_.width) != 0;
+    if (has_left && ranges[pixel] < NOTHING && std::abs(ranges[pixel] - ranges[pixel - 1]) > EDGE_M &&
+        ranges[pixel - 1] < NOTHING)
+      edges.push_back(pixel);
+  }
+  if (edges.empty()) return;
+  const Ranges clean = ranges;
+  const double count = std::floor(camera_.flying_share * static_cast<double>(ranges.size()) + uniform());
+  for (double n = 0; n < count; ++n) {
+    const std::size_t pixel = edges[static_cast<std::size_t>(uniform() * static_cast<double>(edges.size()))];
+    ranges[pixel] = clean[pixel] + uniform() * (clean[pixel - 1] - clean[pixel]);
+  }
+}
+
 std::vector<Eigen::Vector3f> DepthCamera::look(const SceneState& state) {
   Ranges ranges = background_;
   for (std::size_t b = 0; b < state.bodies.size(); ++b) {
@@ -188,6 +207,7 @@ std::vector<Eigen::Vector3f> DepthCamera::look(const SceneState& state) {
       drawFaces(ranges, in_camera, surface.faces);
     }
   }
+  if (camera_.flying_share > 0) makeFly(ranges);
   std::vector<Eigen::Vector3f> cloud;
   cloud.reserve(ranges.size());
   for (std::size_t pixel = 0; pixel < ranges.size(); ++pixel) {

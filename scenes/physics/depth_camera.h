@@ -35,6 +35,7 @@ class DepthCamera {
   void drawBox(Ranges& ranges, const Eigen::Isometry3d& pose, const Vec3& half_size_m) const;
   void drawFaces(Ranges& ranges, const Positions& vertices, const std::vector<Face>& faces) const;
   void drawRope(Ranges& ranges, const Positions& points, double radius_m) const;
+  void makeFly(Ranges& ranges);
   double uniform();
   double gaussian();
 

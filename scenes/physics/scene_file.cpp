@@ -234,6 +234,7 @@ Camera readCamera(ParameterReader map, const SceneSpec& spec) {
   camera.rate_hz = map.number("rate_hz", 0.01, spec.frame_rate_hz);
   camera.noise_m = map.number("noise_m", 0.0, 0.0, 1.0);
   camera.lost_share = map.number("lost_share", 0.0, 0.0, 1.0);
+  camera.flying_share = map.number("flying_share", 0.0, 0.0, 1.0);
   camera.lag_s = map.number("lag_s", 0.0, 0.0, 60.0);
   camera.empty_clouds = map.integer("empty_clouds", 0, 0, 1000);
   if (camera.empty_clouds > 600 * camera.rate_hz)

@@ -136,10 +136,11 @@ struct Camera {
   double rate_hz = 0.0;            ///< clouds a second, at most one a frame
   double noise_m = 0.0;            ///< standard deviation of a range
   double lost_share = 0.0;         ///< 0 to 1, of the pixels
+  double flying_share = 0.0;       ///< the same, of those that lie between what is in front at an edge and behind
   double lag_s = 0.0;              ///< from the stamp of a cloud to when it and its map come
   int empty_clouds = 0;            ///< before the scene begins, of the solids alone
   double inset_m = 0.0;            ///< the solids seen are smaller by this: their faces lie within voxels of the map
-  int seed = 1;                    ///< of noise and lost pixels
+  int seed = 1;                    ///< of noise, lost and flying pixels
 };
 
 struct Wind {

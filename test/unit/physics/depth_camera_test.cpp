@@ -233,6 +233,29 @@ TEST(DepthCamera, TheShareOfPixelsThatItSaysIsLost) {
   EXPECT_NEAR(seen / count, 0.7, 5 * std::sqrt(0.3 * 0.7 / count));
 }
 
+TEST(DepthCamera, PixelsFlyBetweenWhatIsInFrontAndBehind) {
+  const std::string solids = std::string(BOX) + "\n    - box: {min_m: [-9, -9, -1], max_m: [9, 9, -0.5]}";
+  const SceneSpec still = sceneOf(solids), flying = sceneOf(solids, ", flying_share: 0.002");
+  const auto clean = DepthCamera(still).look(startOf(still));
+  DepthCamera camera(flying);
+  int moved = 0;
+  for (int look = 0; look < 50; ++look) {
+    const auto cloud = camera.look(startOf(flying));
+    for (std::size_t pixel = 0; pixel < cloud.size(); ++pixel) {
+      if (cloud[pixel] == clean[pixel]) continue;
+      ++moved;
+      ASSERT_GT(pixel % 48, 0u);
+      const float range = cloud[pixel].norm(), own = clean[pixel].norm(), left = clean[pixel - 1].norm();
+      EXPECT_GT(std::abs(own - left), 0.05f);
+      EXPECT_GE(range, std::min(own, left) - 1e-6f);
+      EXPECT_LE(range, std::max(own, left) + 1e-6f);
+    }
+  }
+  // Now and then two take the same place.
+  EXPECT_LE(moved, 50 * 0.002 * 48 * 36 + 50);
+  EXPECT_GE(moved, 0.9 * 50 * 0.002 * 48 * 36);
+}
+
 TEST(DepthCamera, TheSeedAloneMakesTheDifference) {
   const auto bytesOf = [](const SceneSpec& spec) {
     const auto cloud = DepthCamera(spec).look(startOf(spec));

@@ -109,6 +109,7 @@ TEST(SceneFile, ACameraIsReadStrictly) {
   expectTold(down + size + ", noise_m: -0.001", "camera/noise_m is -0.001, it must be from 0 to 1");
   expectTold(down + size + ", lag_s: .inf", "camera/lag_s is inf, it must be from 0 to 60");
   expectTold(down + size + ", lost_share: 1.5", "camera/lost_share is 1.5, it must be from 0 to 1");
+  expectTold(down + size + ", flying_share: -1", "camera/flying_share is -1, it must be from 0 to 1");
   expectTold(down + size + ", seed: -1", "camera/seed is -1, it must be from 0");
   expectTold(down + size + ", empty_clouds: -1", "camera/empty_clouds is -1, it must be from 0 to 1000");
   expectTold(down + ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: 0.01, empty_clouds: 10",
