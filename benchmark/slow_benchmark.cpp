@@ -8,11 +8,14 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <future>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dccd/monitor_extras.h"
@@ -124,56 +127,81 @@ nlohmann::json row(const Candidate& candidate, const Runs& runs, const Runs& our
           {"ours_faster_by_m_s", meanOf(less_m_s)}};
 }
 
-/// The fastest of them that has no contact in any run. By their speeds over a few seeds they are tried in order; the
-/// runs in which another one touched come first, so that one that touches is soon seen to.
-nlohmann::json fastestWithout(const std::vector<Candidate>& candidates, const Runs& ours) {
-  constexpr std::size_t A_FEW = 20;
-  const std::size_t seeds = ours.speed_m_s.size();
-  std::vector<std::size_t> order(2 * seeds);  // of runs
-  std::iota(order.begin(), order.end(), 0);
-  const auto look = [&](const Candidate& candidate, std::size_t count) {
-    Runs runs(seeds);
-    for (std::size_t i = 0; i < count; ++i) {
-      if (runs.run(order[i], candidate.scale)) continue;
-      std::rotate(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(i),
-                  order.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+/// Runs of laws one after another. Those in which a law touched come first, so that the next one that touches is soon
+/// seen to.
+class Search {
+ public:
+  explicit Search(std::size_t seeds) : order_(2 * seeds) { std::iota(order_.begin(), order_.end(), 0); }
+
+  /// The first `count` runs, until one touches.
+  Runs look(const Candidate& candidate, std::size_t count) {
+    Runs runs(order_.size() / 2);
+    for (std::size_t i = 0; i < std::min(count, order_.size()); ++i) {
+      if (runs.run(order_[i], candidate.scale)) continue;
+      const auto touching = order_.begin() + static_cast<std::ptrdiff_t>(i);
+      std::rotate(order_.begin(), touching, touching + 1);
       break;
     }
     return runs;
-  };
+  }
+  Runs look(const Candidate& candidate) { return look(candidate, order_.size()); }
+
+ private:
+  std::vector<std::size_t> order_;
+};
+
+/// By their speeds over a few seeds, without those that touch there.
+std::vector<Candidate> fastestFirst(const std::vector<Candidate>& candidates, std::size_t seeds) {
+  constexpr std::size_t A_FEW = 10;
+  Search search(seeds);
   std::vector<std::pair<double, const Candidate*>> by_speed;
   for (const Candidate& candidate : candidates) {
-    const Runs few = look(candidate, std::min(A_FEW, seeds));
+    const Runs few = search.look(candidate, A_FEW);
     if (few.touches()) continue;
     by_speed.emplace_back(-std::accumulate(few.speed_m_s.begin(), few.speed_m_s.end(), 0.0), &candidate);
   }
   std::stable_sort(by_speed.begin(), by_speed.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
-  for (const auto& [speed, candidate] : by_speed) {
-    const Runs whole = look(*candidate, seeds);
-    std::cerr << candidate->law << ", " << candidate->numbers << (whole.touches() ? ": a contact\n" : ": no contact\n");
-    if (whole.touches()) continue;
-    nlohmann::json best = row(*candidate, whole, ours);
-    best["tried"] = candidates.size();
-    return best;
+  std::vector<Candidate> sorted;
+  for (const auto& [speed, candidate] : by_speed) sorted.push_back(*candidate);
+  return sorted;
+}
+
+/// The first of them that has no contact in any run, and its runs.
+std::optional<std::pair<Candidate, Runs>> firstWithout(const std::vector<Candidate>& candidates, std::size_t seeds) {
+  Search search(seeds);
+  for (const Candidate& candidate : candidates) {
+    Runs whole = search.look(candidate);
+    std::cerr << candidate.law + ", " + candidate.numbers + (whole.touches() ? ": a contact\n" : ": no contact\n");
+    if (!whole.touches()) return std::pair(candidate, std::move(whole));
   }
-  return {{"law", candidates.at(0).law}, {"tried", candidates.size()}};
+  return std::nullopt;
 }
 
 int run(const std::string& out, std::size_t seeds) {
-  const Candidate our_law = ours(UNCERTAINTY_M);
-  const Runs our_runs = measure(our_law, seeds);
-  std::cerr << our_law.law << ": contacts " << our_runs.contacts[0] << " and " << our_runs.contacts[1]
-            << ", fastest point of the cloth " << our_runs.cloth_m_s << " m/s\n";
   std::vector<Candidate> thresholds, servos, formulas;
   for (const double at_m : {0.08, 0.1, 0.12, 0.15, 0.2, 0.25}) {
     for (const double creep : {0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5}) {
       for (const double stop_m : {0.01, 0.02, 0.03, 0.04}) thresholds.push_back(threshold(at_m, creep, stop_m));
     }
   }
+  // Of these, as of the formulas, one with a larger number is slower at each distance.
   for (int i = 2; i <= 50; ++i) servos.push_back(servo(0.01 * i));
+  auto threshold_found =
+      std::async(std::launch::async, [&] { return firstWithout(fastestFirst(thresholds, seeds), seeds); });
+  auto servo_found = std::async(std::launch::async, [&] { return firstWithout(servos, seeds); });
+  const Candidate our_law = ours(UNCERTAINTY_M);
+  const Runs our_runs = measure(our_law, seeds);
+  std::cerr << our_law.law << ": contacts " << our_runs.contacts[0] << " and " << our_runs.contacts[1]
+            << ", fastest point of the cloth " << our_runs.cloth_m_s << " m/s\n";
   for (int i = 0; i <= 24; ++i) formulas.push_back(speedAndSeparation(our_runs.latency_s, 0.0025 * i));
   nlohmann::json rows = {row(our_law, our_runs, our_runs)};
-  for (const auto& candidates : {thresholds, servos, formulas}) rows.push_back(fastestWithout(candidates, our_runs));
+  const auto add = [&](const std::vector<Candidate>& tried, const std::optional<std::pair<Candidate, Runs>>& found) {
+    rows.push_back(found ? row(found->first, found->second, our_runs) : nlohmann::json{{"law", tried.at(0).law}});
+    rows.back()["tried"] = tried.size();
+  };
+  add(formulas, firstWithout(formulas, seeds));
+  add(thresholds, threshold_found.get());
+  add(servos, servo_found.get());
   std::ofstream(out) << nlohmann::json{{"seeds", seeds},
                                        {"latency_s", our_runs.latency_s},
                                        {"cloth_m_s", our_runs.cloth_m_s},

@@ -89,8 +89,8 @@ class DCCD_EXPORT PromiseWatch {
   /// What the promise rests on has changed, as which contacts are expected, or which bodies there are: it is void from
   /// now on, and the next answer says so. `why`: a sentence. Without a promise that stands nothing happens.
   void revoke(const std::string& why);
-  /// Nothing is looked back on, as after a reset.
-  void forget();
+  /// Nothing is looked back on, as after a reset, and nothing is promised until the next answer. `why`: as revoke()'s.
+  void forget(const std::string& why = {});
 
   const SafeUntil& promise() const { return promise_; }
   /// Why the promise before this one, or the one that was revoked, was void; empty: it was not, as far as both answers

@@ -282,7 +282,12 @@ void CloudMapping::checkOthers(const ViewName& name, StampNs receipt_ns) const {
     if (!view.problem.empty()) throw WireError("the newest cloud " + nameOf(other) + " was refused: " + view.problem);
     const double silent_s = secondsBetween(view.receipt_ns, receipt_ns);
     if (config_.monitor.octomap_timeout_s <= 0 || silent_s <= config_.monitor.octomap_timeout_s) continue;
-    throw WireError("no cloud " + nameOf(other) + " has come for longer than octomap_timeout_s");
+    std::string text = "no cloud " + nameOf(other) + " has come for longer than octomap_timeout_s";
+    // Of one that was renamed and one of two that died the other's clouds say the same.
+    if (other.first == name.first) {
+      text += "; if '" + name.second + "' is that camera's new name, restart the monitor, which takes them for two";
+    }
+    throw WireError(text);
   }
 }
 

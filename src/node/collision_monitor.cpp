@@ -195,7 +195,6 @@ void CollisionMonitor::Impl::start() {
     queue.command([this, changed] {
       for (const std::string& sentence : pipeline.robotChanged(changed))
         log.complain(config.monitor.clock_body, "robot", sentence);
-      if (!changed.empty()) state.takeBack("the robot's description has changed");
     });
   });
   master->start();

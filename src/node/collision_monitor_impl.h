@@ -92,6 +92,7 @@ struct CollisionMonitor::Impl {
   void listenToCameraInfo(std::size_t source);
 
   // Service thread.
+  Reply ask(const std::function<Reply()>& run);
   void advertiseServices(ros::NodeHandle& service);
   void advertiseExpectations(ros::NodeHandle& service);
   void advertiseObjects(ros::NodeHandle& service);
@@ -109,7 +110,8 @@ struct CollisionMonitor::Impl {
   void publishOutcome(Outcome& outcome);
   void predict(Outcome& outcome);
   void publishPrediction(const Outcome& prediction);
-  void publishRevoked();
+  void publishVoided();
+  void publishNoPromise();
   void publishEffects(const ros::Time& stamp);
   void logEffects();
   void accountDropped();

@@ -61,7 +61,7 @@ void MonitorPipeline::attach(AttachedObject object) {
   setBody(first + number, body, std::move(rigid));
   attached_.resize(std::max(count, number + 1));
   attached_[number] = Attached{std::move(object), true};
-  promises_.revoke("object '" + body.name + "' was attached");
+  voidWhatWasSaid("object '" + body.name + "' was attached");
   try {
     expectNow(config_.phase);
   } catch (...) {
@@ -83,7 +83,7 @@ void MonitorPipeline::detach(const std::string& name) {
   rigid.frame_from_mesh = pose * rigid.frame_from_mesh;
   rigid.frame = fixed_frame_;
   attached_[number]->held = false;
-  promises_.revoke("object '" + name + "' was detached");
+  voidWhatWasSaid("object '" + name + "' was detached");
   expectNow(config_.phase);
 }
 
@@ -91,7 +91,7 @@ void MonitorPipeline::remove(const std::string& name) {
   const std::size_t number = attachedNumber(name);
   if (number == attached_.size()) throw ParameterError("object '" + name + "' is not there");
   static const auto NOTHING = share(Topology::fromTriangles(0, {}));
-  promises_.revoke("object '" + name + "' was removed");
+  voidWhatWasSaid("object '" + name + "' was removed");
   attached_[number].reset();
   expectNow(config_.phase);  // before the body that is expected is gone
   Rigid none;

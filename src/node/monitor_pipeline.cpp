@@ -130,7 +130,12 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
   monitor_->setOptions(options);
   // In place, so that nothing else is written: the threads of topics and maps read the rest of it meanwhile.
   change(config_.monitor, config_.markers);
-  if (expects_others) promises_.revoke("other contacts are expected now");
+  if (expects_others) voidWhatWasSaid("other contacts are expected now");
+}
+
+void MonitorPipeline::voidWhatWasSaid(const std::string& why) {
+  promises_.revoke(why);
+  if (voided_.empty()) voided_ = why;  // the first reason: what else changes follows from it
 }
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
@@ -219,14 +224,14 @@ void MonitorPipeline::giveUp() {
   monitor_->finish();
 }
 
-void MonitorPipeline::reset(StepStatus status) {
+void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   for (std::size_t b = 0; b < waiting_.size(); ++b) {
     if (!waiting_[b] || isStatic(b)) continue;
     monitor_->countDropped(b, status);
     waiting_[b].reset();
   }
   monitor_->reset(status);
-  promises_.forget();
+  promises_.forget(why);
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
   learnAnew(status);

@@ -72,8 +72,9 @@ class MonitorPipeline {
   /// End of input: whatever still waits is given up at the next call of nextOutcome().
   void finish();
   /// Forgets all frames but those of static bodies, also where they wait. After RESET triangle soups are welded anew,
-  /// and a fixed frame that was learnt is learnt anew: from the clock body's next message.
-  void reset(StepStatus status);
+  /// and a fixed frame that was learnt is learnt anew: from the clock body's next message. `why`: what is said of the
+  /// promise that is forgotten.
+  void reset(StepStatus status, const std::string& why = {});
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
   Outcome checkNow();
 
@@ -114,6 +115,9 @@ class MonitorPipeline {
   /// What the last outcome promises, and what became of the promise before; nothing where the configuration has no
   /// bounds.
   const PromiseWatch& promises() const { return promises_; }
+  /// Why what was said of the last outcome is void, since the last call: a call has changed what it rests on. Empty: it
+  /// stands.
+  std::string takeVoided() { return std::exchange(voided_, {}); }
   /// What may be said of the last outcome.
   const Statement& statement() const { return statement_; }
   /// How fast bodies are assumed to be, by body.
@@ -164,6 +168,7 @@ class MonitorPipeline {
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
   PromiseWatch promises_;
+  std::string voided_;
   Statement statement_;
   std::vector<StampNs> widened_ns_;                      // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;                             // a static body of which the monitor has a frame
@@ -217,6 +222,7 @@ class MonitorPipeline {
   bool finishing_ = false;
 
   void loadFiles();
+  void voidWhatWasSaid(const std::string& why);
   void setRigid(std::size_t body, const MeshResource& mesh);
   static Rigid rigidOf(const MeshResource& mesh);
   /// The parameter that one of the expectations is from.

@@ -43,7 +43,7 @@ const std::vector<std::string>& MonitorPipeline::robotChanged(const std::vector<
     robot_changed_.push_back("parameter " + name +
                              " is another one than at the start; restart the monitor, which watches the robot of then");
   }
-  if (!robot_changed_.empty()) promises_.revoke(robot_changed_.front());
+  if (!robot_changed_.empty()) voidWhatWasSaid(robot_changed_.front());
   return robot_changed_;
 }
 

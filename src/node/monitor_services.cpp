@@ -29,31 +29,40 @@ ros::ServiceServer advertise(ros::NodeHandle& node, const char* name,
 
 }  // namespace
 
+/// What the call made void is so before its caller hears that it was done.
+Reply CollisionMonitor::Impl::ask(const std::function<Reply()>& run) {
+  const auto command = [this, run] {
+    const Reply reply = run();
+    publishVoided();
+    return reply;
+  };
+  return queue.call(command, SERVICE_TIMEOUT_S);
+}
+
 void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
   using std_srvs::SetBool;
   using std_srvs::Trigger;
-  const auto ask = [this](const std::function<Reply()>& run) { return queue.call(run, SERVICE_TIMEOUT_S); };
-  services.push_back(advertise<Trigger>(service, "check_now", [this, ask](const Trigger::Request&) {
+  services.push_back(advertise<Trigger>(service, "check_now", [this](const Trigger::Request&) {
     return ask([this] {
       const Outcome outcome = pipeline.checkNow();
       return Reply{outcome.answered, describe(outcome)};
     });
   }));
-  services.push_back(advertise<Trigger>(service, "record_step", [this, ask](const Trigger::Request&) {
+  services.push_back(advertise<Trigger>(service, "record_step", [this](const Trigger::Request&) {
     return ask([this] {
       Reply reply;
       reply.success = recorder.record(reply.message);
       return reply;
     });
   }));
-  services.push_back(advertise<Trigger>(service, "reset", [this, ask](const Trigger::Request&) {
+  services.push_back(advertise<Trigger>(service, "reset", [this](const Trigger::Request&) {
     state.asked("a reset was asked for");
     return ask([this] {
       resetNow(StepStatus::RESET);
       return Reply{true, "frames forgotten; the next one is a first frame"};
     });
   }));
-  services.push_back(advertise<SetBool>(service, "enable", [this, ask](const SetBool::Request& request) {
+  services.push_back(advertise<SetBool>(service, "enable", [this](const SetBool::Request& request) {
     enabled = request.data;
     state.setEnabled(enabled);
     state.asked("~enable was called");
@@ -69,22 +78,21 @@ void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
 void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
   using deformable_ccd::Named;
   using deformable_ccd::SetHold;
-  const auto ask = [this](const std::function<void()>& set) {
-    const auto run = [this, set] {
+  const auto expect = [this](const std::function<void()>& set) {
+    return ask([this, set] {
       try {
         set();
       } catch (const ParameterError& error) {
         return Reply{false, error.what() + std::string("; in force is ") + pipeline.phaseInWords()};
       }
       return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
-    };
-    return queue.call(run, SERVICE_TIMEOUT_S);
+    });
   };
-  services.push_back(advertise<Named>(service, "set_phase", [this, ask](const Named::Request& request) {
-    return ask([this, phase = request.name] { pipeline.setPhase(phase); });
+  services.push_back(advertise<Named>(service, "set_phase", [this, expect](const Named::Request& request) {
+    return expect([this, phase = request.name] { pipeline.setPhase(phase); });
   }));
-  services.push_back(advertise<SetHold>(service, "set_hold", [this, ask](const SetHold::Request& request) {
-    return ask([this, request] { pipeline.setHold(request.body, request.by, request.holds); });
+  services.push_back(advertise<SetHold>(service, "set_hold", [this, expect](const SetHold::Request& request) {
+    return expect([this, request] { pipeline.setHold(request.body, request.by, request.holds); });
   }));
 }
 
@@ -92,11 +100,11 @@ void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
   using deformable_ccd::AttachObject;
   using deformable_ccd::Named;
   // What is refused is counted, be it on this thread, where meshes are read, or on the worker's.
-  const auto ask = [this](const std::string& done, const std::function<std::function<void()>()>& read) {
+  const auto object = [this](const std::string& done, const std::function<std::function<void()>()>& read) {
     Reply reply;
     try {
       const std::function<void()> change = read();
-      reply = queue.call([change, done] { return change(), Reply{true, done}; }, SERVICE_TIMEOUT_S);
+      reply = ask([change, done] { return change(), Reply{true, done}; });
     } catch (const std::exception& error) {
       reply.message = error.what();
     }
@@ -104,21 +112,17 @@ void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
     reply.message = shortText(reply.message);
     return reply;
   };
-  services.push_back(advertise<AttachObject>(service, "attach", [this, ask](const AttachObject::Request& request) {
-    return ask("from the next step on '" + request.name + "' moves with " + request.link, [&] {
-      return [this, object = readAttach(request, config)] {
-        pipeline.attach(object);
-        state.takeBack("no step has been answered since '" + object.name + "' was attached");
-      };
-    });
+  services.push_back(advertise<AttachObject>(service, "attach", [this, object](const AttachObject::Request& request) {
+    return object("from the next step on '" + request.name + "' moves with " + request.link,
+                  [&] { return [this, attached = readAttach(request, config)] { pipeline.attach(attached); }; });
   }));
-  services.push_back(advertise<Named>(service, "detach", [this, ask](const Named::Request& request) {
-    return ask("from the next step on '" + request.name + "' stays where it is",
-               [&] { return [this, name = request.name] { pipeline.detach(name); }; });
+  services.push_back(advertise<Named>(service, "detach", [this, object](const Named::Request& request) {
+    return object("from the next step on '" + request.name + "' stays where it is",
+                  [&] { return [this, name = request.name] { pipeline.detach(name); }; });
   }));
-  services.push_back(advertise<Named>(service, "remove", [this, ask](const Named::Request& request) {
-    return ask("'" + request.name + "' is forgotten",
-               [&] { return [this, name = request.name] { pipeline.remove(name); }; });
+  services.push_back(advertise<Named>(service, "remove", [this, object](const Named::Request& request) {
+    return object("'" + request.name + "' is forgotten",
+                  [&] { return [this, name = request.name] { pipeline.remove(name); }; });
   }));
 }
 

@@ -33,9 +33,11 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
     pipeline.monitor().countDropped(b, status, cleared[b]);
   }
   const std::string frame = pipeline.fixedFrame();  // a reset forgets one that was learnt
-  pipeline.reset(status);
-  state.forgotten(std::string("no frame has been answered since ") +
-                  (status == StepStatus::RESET ? "the reset" : "~enable was called"));
+  const std::string why = std::string("no frame has been answered since ") +
+                          (status == StepStatus::RESET ? "the reset" : "~enable was called");
+  pipeline.reset(status, why);
+  state.forgotten(why);
+  publishNoPromise();
   outputs.publishNothing(frame);
   if (!outputs.wantsPrediction()) return;
   Outcome none;
@@ -191,11 +193,17 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   carryOut([this] { outputs.publishNothing(pipeline.fixedFrame()); });
 }
 
-/// A promise is latched: nobody is to go on by one that a command made void.
-void CollisionMonitor::Impl::publishRevoked() {
-  const PromiseWatch& promises = pipeline.promises();
-  if (!promises.isRevoked()) return;
-  outputs.publishSafeUntil(toSafeUntil(Outcome(), promises, {}, ros::Time::now(), pipeline.fixedFrame()));
+/// State and promise are latched: nobody is to go on by what a command made void.
+void CollisionMonitor::Impl::publishVoided() {
+  const std::string why = pipeline.takeVoided();
+  if (why.empty()) return;
+  state.takeBack(why + "; no step has been answered since");
+  publishNoPromise();
+}
+
+void CollisionMonitor::Impl::publishNoPromise() {
+  if (!config.promises()) return;
+  outputs.publishSafeUntil(toSafeUntil(Outcome(), pipeline.promises(), {}, ros::Time::now(), pipeline.fixedFrame()));
 }
 
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
@@ -263,7 +271,7 @@ void CollisionMonitor::Impl::work() {
 /// True when more can be done at once.
 bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
   for (const auto& command : commands) carryOut(command);
-  if (!commands.empty()) publishRevoked();
+  if (!commands.empty()) publishVoided();
   if (map_publisher_seen) pipeline.expectMap();
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
   pipeline.effects().hearDistances(outputs.wantsDistances());

@@ -159,7 +159,7 @@ std::string MeshStore::unknownAfterNewest(std::uint64_t accounted) const {
   if (came_ <= last.number + accounted) return last.frame->doubt;
   const std::uint64_t missed = came_ - last.number - accounted;
   return std::to_string(missed) + (missed == 1 ? " frame of it that came was" : " frames of it that came were") +
-         " not used: " + (why_.empty() ? "QUEUE_FULL, or lost on the way here" : why_);
+         " not used: " + (why_.empty() ? "the queue was full (QUEUE_FULL), or memory ran out" : why_);
 }
 
 std::string MeshStore::unknownWithin(StampNs from_ns, StampNs to_ns) const {

@@ -322,17 +322,19 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
 
 void PromiseWatch::revoke(const std::string& why) {
   if (!step_) return;
-  const StampNs stamp_ns = step_->stamp_ns;
-  forget();
-  promise_.stamp_ns = promise_.until_ns = promise_.others_until_ns = stamp_ns;
-  promise_.reason = broken_ = revoked_ = why;
+  promise_.stamp_ns = step_->stamp_ns;
+  forget(why);
+  broken_ = revoked_ = why;
   ++counts_.broken;
 }
 
-void PromiseWatch::forget() {
+void PromiseWatch::forget(const std::string& why) {
   step_ = nullptr;
   obstacle_ = nullptr;
+  const StampNs stamp_ns = promise_.stamp_ns;
   promise_ = {};
+  promise_.stamp_ns = promise_.until_ns = promise_.others_until_ns = stamp_ns;
+  promise_.reason = why;
   broken_.clear();
   revoked_.clear();
 }

@@ -1,5 +1,5 @@
 // Distances of hard pairs and hard steps, judged by rational arithmetic: lower <= truth <= upper, and as narrow as was
-// asked for. Seeds are fixed; DEFORMABLE_CCD_LONG=1 runs 1e6 pairs and 1e4 steps.
+// asked for. Seeds are fixed; DEFORMABLE_CCD_LONG=1 runs 1e6 pairs, 2e5 needles and 3e4 steps.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -81,6 +81,48 @@ double largestOf(const std::array<TrueHull, 2>& hulls) {
   return largest;
 }
 
+/// What at() says of a pair at a time must hold the truth; returned is by how many of `wide_m` the two bounds differ.
+double widthOf(const std::array<TrueHull, 2>& hulls, HullPair& pair, double t, double wide_m, Nearest& nearest) {
+  pair.set(hullOf(hulls[0]), hullOf(hulls[1]));
+  nearest = pair.at(t, wide_m);
+  const double lower_m = pair.lowerInMetres(nearest.lower), upper_m = pair.upperInMetres(nearest.upper);
+  const Rational truth = trueSquaredDistance(hulls[0], hulls[1], t), lower(lower_m), upper(upper_m);
+  EXPECT_LE(lower * lower, truth) << "lower_m " << lower_m << " is above the truth";
+  EXPECT_GE(upper * upper, truth) << "upper_m " << upper_m << " is below the truth, of " << hulls[0].size() << " and "
+                                  << hulls[1].size() << " corners";
+  return (upper_m - lower_m) / std::max(wide_m, 1e-288);
+}
+
+/// Three corners all but in a line, which goes through a point.
+TrueHull needle(const Draw& draw, const Vec3& through) {
+  const Vec3 along(draw(-9, 9), draw(-9, 9), draw(1, 9));
+  const double share = draw(1, 15) / 16.0, length_m = std::ldexp(1.0, -draw(0, 30)),
+               thin = std::ldexp(1.0, -draw(24, 54));
+  TrueHull hull;
+  for (const double at : {0.0, draw(0, 16) / 16.0, 1.0}) {
+    const Vec3 off(draw(-9, 9), draw(-9, 9), draw(-9, 9));
+    const Vec3 corner = through + length_m * ((at - share) * along + thin * off);
+    hull.push_back({corner, corner});
+  }
+  return hull;
+}
+
+// A needle through another one, or through a box, or close by.
+TEST(ClearanceProperty, OfNeedlesIsAsNarrow) {
+  const int pairs = longRun() ? 200000 : 2000;
+  const Draw draw = drawFrom(20170601);
+  for (int i = 0; i < pairs; ++i) {
+    const Vec3 place(draw(-9, 9), draw(-9, 9), draw(-9, 9)), by(draw(-9, 9), draw(-9, 9), draw(-9, 9));
+    const Vec3 apart = std::ldexp(1.0, -draw(20, 54)) * by;
+    std::array<TrueHull, 2> hulls{needle(draw, place), needle(draw, place + apart)};
+    if (draw(0, 1) == 0) hulls[1] = boxAround(hulls[1][0][0], hulls[1][2][0]);
+    HullPair pair;
+    Nearest nearest;
+    ASSERT_LE(widthOf(hulls, pair, 0, 1e-9 * largestOf(hulls), nearest), 1) << "pair " << i;
+    ASSERT_FALSE(HasFailure()) << "pair " << i;
+  }
+}
+
 TEST(ClearanceProperty, PairsHoldTheTruth) {
   const int pairs = longRun() ? 1000000 : 10000;
   RandomSource random(propertySeed());
@@ -90,29 +132,24 @@ TEST(ClearanceProperty, PairsHoldTheTruth) {
     const std::array<TrueHull, 2> hulls = hardHulls(random, draw);
     const double t = draw(0, 3) == 0 ? draw(0, 1) : draw(0, 64) / 64.0, largest_m = largestOf(hulls);
     HullPair pair;
-    pair.set(hullOf(hulls[0]), hullOf(hulls[1]));
-    const double wide_m = 1e-9 * largest_m;
-    const Nearest nearest = pair.at(t, wide_m);
-    const double lower_m = pair.lowerInMetres(nearest.lower), upper_m = pair.upperInMetres(nearest.upper);
-    const Rational truth = trueSquaredDistance(hulls[0], hulls[1], t), lower(lower_m), upper(upper_m);
-    ASSERT_LE(lower * lower, truth) << "pair " << i << ": lower_m " << lower_m << " is above the truth";
-    ASSERT_GE(upper * upper, truth) << "pair " << i << ": upper_m " << upper_m << " is below the truth, of "
-                                    << hulls[0].size() << " and " << hulls[1].size() << " corners";
-    // Of triangles that are needles as thin as rounding the search misses the best points now and then.
-    wider += upper_m - lower_m > std::max(wide_m, 1e-288);
-    ASSERT_LE(upper_m - lower_m, std::max(16 * wide_m, 1e-288)) << "pair " << i << ", size " << largest_m;
+    Nearest nearest;
+    const double wide_m = 1e-9 * largest_m, width = widthOf(hulls, pair, t, wide_m, nearest);
+    ASSERT_FALSE(HasFailure()) << "pair " << i;
+    // Of needles as thin as rounding the search misses the best points by so much now and then.
+    ASSERT_LE(width, 2) << "pair " << i << ", size " << largest_m;
+    wider += width > 1;
     // The directions of two times, or one of them twice, bound the distance at all times between two others, too.
     const double from = draw(0, 63) / 64.0, to = draw(static_cast<int>(64 * from) + 1, 64) / 64.0;
     const Vec3 at_end = draw(0, 3) == 0 ? nearest.direction : pair.at(to, wide_m).direction;
     const Rational also(std::max(0.0, pair.lowerInMetres(pair.lowerOver({nearest.direction, at_end}, from, to))));
     const double between = from + (to - from) * draw(0, 8) / 8;
     ASSERT_LE(also * also, trueSquaredDistance(hulls[0], hulls[1], between)) << "pair " << i << " at " << between;
-    ++(truth == 0 ? zero : positive);
+    ++(nearest.lower > 0 ? positive : zero);
   }
-  std::cout << pairs << " pairs, " << zero << " of them meet, " << wider << " are wider than was asked for\n";
+  std::cout << pairs << " pairs, " << zero << " of them may meet, " << wider << " are wider than was asked for\n";
   EXPECT_GT(positive, pairs / 2);
   EXPECT_GT(zero, pairs / 100);
-  EXPECT_LE(wider, pairs / 10000);
+  EXPECT_LE(wider, pairs / 100000);
 }
 
 /// A body of some triangles that turns about an axis, whose foot goes straight, and where it truly is.

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 #include <std_msgs/Float64.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
 
 #include <algorithm>
 #include <array>
@@ -153,6 +155,21 @@ TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
   // No frame follows.
   EXPECT_TRUE(waitUntil([&] { return scales.last().scale == 0; }, 2)) << "0.4 s are the reaction time";
   EXPECT_EQ(values.last().data, 0);
+  // What is latched does not outlive the frames that it was made of.
+  const auto expectNone = [&](const std::string& since) {
+    const std::string why = "no frame has been answered since " + since;
+    EXPECT_TRUE(waitUntil([&] { return promises.last().reason == why; })) << promises.last().reason;
+    EXPECT_EQ(promises.last().seconds, 0) << why;
+    EXPECT_EQ(promises.last().until, promises.last().header.stamp) << why;
+  };
+  std_srvs::Trigger reset;
+  ASSERT_TRUE(ros::service::call(name + "/reset", reset));
+  expectNone("the reset");
+  send(0.45);
+  EXPECT_GT(send(0.45).seconds, 0);
+  std_srvs::SetBool enable;
+  ASSERT_TRUE(ros::service::call(name + "/enable", enable));
+  expectNone("~enable was called");
 }
 
 }  // namespace

@@ -41,6 +41,19 @@ const Shape& shapeOf(std::size_t corners) {
   return corners == 1 ? POINT : corners == 2 ? SEGMENT : corners == 3 ? TRIANGLE : BOX;
 }
 
+/// Across a triangle, be it a needle: of its longest edge and the way to it, and no rounding along that edge stays. So
+/// it is wrong about that edge alone, where a needle is too thin for it to matter.
+Vec3 normalOf(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const std::array<Vec3, 3> edge{b - a, c - b, a - c};
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < 3; ++k) longest = edge[k].squaredNorm() > edge[longest].squaredNorm() ? k : longest;
+  const Vec3 &e = edge[longest], &next = edge[(longest + 1) % 3];
+  const double ee = e.squaredNorm();
+  if (!(ee > 0)) return Vec3::Zero();
+  const Vec3 n = e.cross(next - e * (e.dot(next) / ee));
+  return n - e * (e.dot(n) / ee);
+}
+
 }  // namespace
 
 /// Of the differences of a simplex.
@@ -107,6 +120,25 @@ struct HullPair::Simplex {
     takeNearer(onSegment(j, k), best);
     takeNearer(onSegment(k, i), best);
     return best;
+  }
+
+  /// Of a triangle, be it a needle: the point within it, once more along its longest edge, and those of its edges. The
+  /// first alone is wrong by the rounding of a normal that is nearly nothing.
+  std::array<Combination, 4> onNeedle() const {
+    std::array<Combination, 4> points{onTriangle(0, 1, 2), onSegment(0, 1), onSegment(1, 2), onSegment(2, 0)};
+    int i = 0;
+    for (int k = 1; k < 3; ++k) i = (w[(k + 1) % 3] - w[k]).norm() > (w[(i + 1) % 3] - w[i]).norm() ? k : i;
+    const int j = (i + 1) % 3;
+    const Vec3 e = w[j] - w[i];
+    const double ee = e.squaredNorm();
+    if (!(ee > 0)) return points;
+    Combination& inside = points[0];
+    const Vec3 v = inside.weight[0] * w[0] + inside.weight[1] * w[1] + inside.weight[2] * w[2];
+    const double s = std::clamp(e.dot(v) / ee, -inside.weight[i], inside.weight[j]);
+    inside.weight[i] += s;
+    inside.weight[j] -= s;
+    inside.direction -= e * (e.dot(inside.direction) / ee);
+    return points;
   }
 
   Combination onTetrahedron() const {
@@ -275,10 +307,34 @@ Nearest HullPair::at(double t, double wide_m) {
   return nearest;
 }
 
+/// Where an edge of one side goes through a triangle of the other.
+void HullPair::tryThrough(std::size_t side, const std::array<std::uint8_t, 2>& edge,
+                          const std::array<std::uint8_t, 3>& triangle, Nearest& nearest) const {
+  const auto &on = now_[side], &of = now_[1 - side];
+  const std::array<Vec3, 3> t{of[triangle[0]], of[triangle[1]], of[triangle[2]]};
+  const Vec3 n = normalOf(t[0], t[1], t[2]);
+  const double from = n.dot(on[edge[0]] - t[0]), to = n.dot(on[edge[1]] - t[0]);
+  if (!(from * to <= 0) || from == to) return;
+  const double s = from / (from - to);
+  const Vec3 through = (1 - s) * on[edge[0]] + s * on[edge[1]];
+  Simplex seen;
+  seen.count = 3;
+  for (int k = 0; k < 3; ++k) seen.w[k] = t[k] - through;
+  for (const Combination& c : seen.onNeedle()) {
+    const Vec3 point = c.weight[0] * t[0] + c.weight[1] * t[1] + c.weight[2] * t[2];
+    const double upper = (through - point).norm() + tolerance::CLEARANCE;
+    if (!(upper < nearest.upper)) continue;
+    nearest.upper = upper;
+    nearest.point[side] = through;
+    nearest.point[1 - side] = point;
+  }
+}
+
 /// What the search may have missed for rounding: every direction that can tell two hulls apart, and every pair of
-/// features: a corner and a triangle, or two edges, whose differences make two triangles.
+/// features: a corner and a triangle, two edges, whose differences make two triangles, or an edge and a triangle that
+/// it goes through.
 void HullPair::improve(Nearest& nearest) const {
-  const Shape &a = shapeOf(count_[0]), &b = shapeOf(count_[1]);
+  const std::array<const Shape*, 2> shape{&shapeOf(count_[0]), &shapeOf(count_[1])};
   const auto tryTriangle = [&](std::array<std::array<std::uint8_t, 2>, 3> corners) {
     Simplex s;
     for (int k = 0; k < 3; ++k) {
@@ -286,25 +342,28 @@ void HullPair::improve(Nearest& nearest) const {
       s.w[k] = now_[0][corners[k][0]] - now_[1][corners[k][1]];
     }
     s.count = 3;
-    Combination c = s.onTriangle(0, 1, 2);
-    tryDirection(c.direction, nearest);
-    s.reduce(c);
-    takeMeans(s, c, nearest);
+    for (const Combination& c : s.onNeedle()) {
+      tryDirection(c.direction, nearest);
+      takeMeans(s, c, nearest);
+    }
   };
-  for (int f = 0; f < a.triangles; ++f) {
-    const auto& t = a.triangle[f];
-    tryDirection((now_[0][t[1]] - now_[0][t[0]]).cross(now_[0][t[2]] - now_[0][t[0]]), nearest);
-    for (std::uint8_t i = 0; i < count_[1]; ++i) tryTriangle({{{t[0], i}, {t[1], i}, {t[2], i}}});
+  for (std::size_t side = 0; side < 2; ++side) {
+    for (int f = 0; f < shape[side]->triangles; ++f) {
+      const auto& t = shape[side]->triangle[f];
+      tryDirection(normalOf(now_[side][t[0]], now_[side][t[1]], now_[side][t[2]]), nearest);
+      for (std::uint8_t i = 0; i < count_[1 - side]; ++i) {
+        const auto pairOf = [&](std::uint8_t corner) {
+          return side == 0 ? std::array<std::uint8_t, 2>{corner, i} : std::array<std::uint8_t, 2>{i, corner};
+        };
+        tryTriangle({pairOf(t[0]), pairOf(t[1]), pairOf(t[2])});
+      }
+      for (int e = 0; e < shape[1 - side]->edges; ++e) tryThrough(1 - side, shape[1 - side]->edge[e], t, nearest);
+    }
   }
-  for (int f = 0; f < b.triangles; ++f) {
-    const auto& t = b.triangle[f];
-    tryDirection((now_[1][t[1]] - now_[1][t[0]]).cross(now_[1][t[2]] - now_[1][t[0]]), nearest);
-    for (std::uint8_t i = 0; i < count_[0]; ++i) tryTriangle({{{i, t[0]}, {i, t[1]}, {i, t[2]}}});
-  }
-  for (int e = 0; e < a.edges; ++e) {
-    for (int f = 0; f < b.edges; ++f) {
-      const auto [a0, a1] = a.edge[e];
-      const auto [b0, b1] = b.edge[f];
+  for (int e = 0; e < shape[0]->edges; ++e) {
+    for (int f = 0; f < shape[1]->edges; ++f) {
+      const auto [a0, a1] = shape[0]->edge[e];
+      const auto [b0, b1] = shape[1]->edge[f];
       tryDirection((now_[0][a1] - now_[0][a0]).cross(now_[1][b1] - now_[1][b0]), nearest);
       tryTriangle({{{a0, b0}, {a0, b1}, {a1, b1}}});
       tryTriangle({{{a0, b0}, {a1, b0}, {a1, b1}}});

@@ -11,14 +11,15 @@
 // - n.a of a computed n: 3 u sqrt(3) 2 for its own operations, sqrt(3) 8 u for the corner's error, 25 u in all; the
 //   difference of two: 50 u and its own rounding, 7 u, as no distance is above 2 sqrt(3) 2 < 7. n is no longer than
 //   1 + 8 u, which is 56 u of a distance. In all 113 u. The mean of two such products is rounded once more: 120 u.
-// - A mean of corners: weights add up to 1 within 4 u, 14 u of a length; its operations 3 u sqrt(3) 2, the corners'
-//   error sqrt(3) 8 u; 39 u in all. The difference of two 78 u, and its length's own roundings 4 u of it, 28 u. In all
-//   106 u.
+// - A mean of corners: weights add up to 1 within 6 u, 21 u of a length; its operations 3 u sqrt(3) 2, the corners'
+//   error sqrt(3) 8 u; 46 u in all. The difference of two 92 u, and its length's own roundings 4 u of it, 28 u. In all
+//   120 u.
 // CLEARANCE is 256 u, of the power of two that is not above the largest coordinate.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "dccd/types.h"
 
@@ -78,6 +79,8 @@ class HullPair {
   void improve(Nearest& nearest) const;
   void takeMeans(const Simplex& simplex, const Combination& of, Nearest& nearest) const;
   void tryDirection(const Vec3& direction, Nearest& nearest) const;
+  void tryThrough(std::size_t side, const std::array<std::uint8_t, 2>& edge,
+                  const std::array<std::uint8_t, 3>& triangle, Nearest& nearest) const;
 
   std::array<std::size_t, 2> count_{};
   std::array<std::array<Vec3, 8>, 2> t0_, t1_, now_;

@@ -158,6 +158,15 @@ TEST(Unfolded, NotAroundFacesTheOtherWayRoundOrThreeAtAnEdge) {
   three.push_back({faces[1600][0], faces[1600][1], faces[10][0]});
   holed.erase(holed.begin() + 1640, holed.begin() + 1646);
   for (const std::vector<Face>& list : {turned, three, holed}) EXPECT_FALSE(isCertified(list));
+  // Three more faces stand on the edges of one inside as a cap: the border is as it was, and the cap's tip may go
+  // through the face.
+  const auto [i, j, k] = faces[1640];
+  const auto tip = static_cast<Index>(side * side);
+  std::vector<Face> capped = faces;
+  for (const Face& face : {Face{i, j, tip}, Face{j, k, tip}, Face{k, i, tip}}) capped.push_back(face);
+  Positions with_tip = flat;
+  with_tip.push_back((flat[i] + flat[j] + flat[k]) / 3);
+  EXPECT_FALSE(certified(Topology::fromTriangles(side * side + 1, capped), with_tip, with_tip));
 }
 
 /// A sheet that waves, and a small ball that falls onto the middle of it.

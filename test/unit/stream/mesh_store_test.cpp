@@ -72,7 +72,7 @@ TEST_F(MeshStoreTest, KnowsTheWayBetweenTwoFramesIfNoneIsMissingBetweenThem) {
   store.push(numbered(10 * MS, 6));
   EXPECT_EQ(store.unknownWithin(0, 10 * MS), "") << "what came before the first is missed by nobody";
   store.push(numbered(20 * MS, 9));
-  const std::string lost = "2 frames of it that came were not used: QUEUE_FULL, or lost on the way here";
+  const std::string lost = "2 frames of it that came were not used: the queue was full (QUEUE_FULL), or memory ran out";
   for (const auto& [from, to] : {std::pair<StampNs, StampNs>{10, 20}, {19, 20}, {10, 11}, {12, 15}, {0, 11}}) {
     EXPECT_EQ(store.unknownWithin(from * MS, to * MS), lost) << from << " " << to;
   }
@@ -85,7 +85,7 @@ TEST_F(MeshStoreTest, KnowsTheWayBetweenTwoFramesIfNoneIsMissingBetweenThem) {
   EXPECT_NE(store.unknownWithin(30 * MS, 40 * MS), "") << "one of two was";
   store.passOver(1, "BAD_MESSAGE: cut");
   EXPECT_EQ(store.unknownWithin(30 * MS + 1, 40 * MS + 1),
-            "1 frame of it that came was not used: QUEUE_FULL, or lost on the way here");
+            "1 frame of it that came was not used: the queue was full (QUEUE_FULL), or memory ran out");
   EXPECT_EQ(store.unknownWithin(40 * MS, 41 * MS), "1 frame of it that came was not used: BAD_MESSAGE: cut");
   EXPECT_EQ(store.unknownWithin(40 * MS, 40 * MS), "");
   store.push(numbered(50 * MS, 16));

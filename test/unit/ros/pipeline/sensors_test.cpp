@@ -339,6 +339,19 @@ TEST(Sensors, OfSeveralCamerasEachMustHaveItsPlaceInTheMap) {
   EXPECT_EQ(left(), "");
 }
 
+// A camera that was renamed looks as one of two of which the other died: there is no map, and what helps is said.
+TEST(Sensors, OneThatWasRenamedIsStillAwaitedAndThatIsSaid) {
+  Camera camera("octomap_timeout_s: 1.0");
+  camera.showCamera("new");
+  EXPECT_EQ(camera.whyNot(cloudOf(1, {{0, 0, 0.8f}})), "");
+  EXPECT_EQ(camera.whyNot(cloudOf(1, {{0, 0, 0.8f}}, "new"), 0, 0.5), "");
+  const std::string why = camera.whyNot(cloudOf(1, {{0, 0, 0.8f}}, "new"), 0, 2);
+  EXPECT_TRUE(says(why,
+                   "has come for longer than octomap_timeout_s; if 'new' is that camera's new name, restart the "
+                   "monitor, which takes them for two"))
+      << why;
+}
+
 TEST(Sensors, ViewsOfOneTopicHaveTheirPlacesInOneMap) {
   Camera camera;
   camera.showCamera("other");

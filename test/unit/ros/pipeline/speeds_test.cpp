@@ -227,7 +227,10 @@ TEST(PromisesOfAPipeline, AreVoidOnceOtherContactsAreExpected) {
   EXPECT_EQ(pipeline.promises().promise().seconds(), MOST_PROMISED_S) << "touching the table is meant";
   pipeline.setPhase("lay");
   EXPECT_TRUE(pipeline.promises().promise().isPromise()) << "nothing has changed";
+  EXPECT_EQ(pipeline.takeVoided(), "");
   pipeline.setPhase("");
+  EXPECT_EQ(pipeline.takeVoided(), "other contacts are expected now");
+  EXPECT_EQ(pipeline.takeVoided(), "");
   EXPECT_TRUE(pipeline.promises().isRevoked());
   EXPECT_FALSE(pipeline.promises().promise().isPromise());
   const auto message = toSafeUntil(Outcome(), pipeline.promises(), {}, ros::Time(1.2), pipeline.fixedFrame());
@@ -245,6 +248,22 @@ TEST(PromisesOfAPipeline, AreVoidOnceOtherContactsAreExpected) {
   EXPECT_THROW(pipeline.setPhase("fold"), ParameterError);
   pipeline.reconfigure([](MonitorOptions& options, MarkerConfig&) { options.detector.max_contacts = 5; });
   EXPECT_TRUE(pipeline.promises().promise().isPromise()) << "it does not rest on what is listed";
+}
+
+TEST(PromisesOfAPipeline, AreForgottenByAResetForItsReason) {
+  Driven cloth(scene("max_speed_m_s: 0.5"));
+  cloth.giveMap(1);
+  cloth.feed(1, 0.2f);
+  cloth.feed(1.1, 0.2f);
+  ASSERT_TRUE(cloth.pipeline.promises().promise().isPromise());
+  cloth.pipeline.reset(StepStatus::RESET, "all is forgotten");
+  const auto message =
+      toSafeUntil(Outcome(), cloth.pipeline.promises(), {}, ros::Time(1.2), cloth.pipeline.fixedFrame());
+  EXPECT_EQ(message.reason, "all is forgotten");
+  EXPECT_EQ(message.header.stamp, ros::Time(1.1));
+  EXPECT_EQ(message.until, message.header.stamp);
+  EXPECT_EQ(message.broken, "");
+  EXPECT_EQ(cloth.pipeline.counters().promises.broken, 0u);
 }
 
 TEST(SpeedScaleMessage, IsZeroForAReason) {

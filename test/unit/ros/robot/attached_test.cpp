@@ -69,9 +69,11 @@ TEST_F(Attached, APromiseIsVoidOnceSomethingIsTakenLetGoOrForgotten) {
     feed(stamp_s += 0.1, 0, 0.8f);
     ASSERT_TRUE(pipeline().promises().promise().isPromise()) << pipeline().promises().promise().reason;
     const std::uint64_t broken = pipeline().promises().counts().broken;
+    EXPECT_EQ(pipeline().takeVoided(), "");
     change();
     EXPECT_TRUE(pipeline().promises().isRevoked()) << why;
     EXPECT_EQ(pipeline().promises().promise().reason, why);
+    EXPECT_EQ(pipeline().takeVoided(), why) << "what ~state says, too";
     feed(stamp_s += 0.1, 0, 0.8f);
     EXPECT_EQ(pipeline().promises().broken(), why);
     EXPECT_EQ(pipeline().promises().counts().broken, broken + 1);
