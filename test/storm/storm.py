@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""Runs worlds of the storm: storm.py [--from SEED] [--worlds N] [--log FILE] [--keep DIR]; a refuted world is made smaller and told."""
+import argparse
+import collections
+import importlib.machinery
+import importlib.util
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import types
+
+import rosbag
+import yaml
+
+HERE = pathlib.Path(__file__).resolve().parent
+CHECKOUT = HERE.parents[1]
+TOOLS = pathlib.Path(os.environ.get('DEFORMABLE_CCD_WORKSPACE', CHECKOUT / 'build')) / 'devel/lib/deformable_ccd'
+sys.path.insert(0, str(HERE))
+import worlds  # noqa: E402
+
+_loader = importlib.machinery.SourceFileLoader('audit_bag', str(CHECKOUT / 'audit/audit_bag'))
+audit = types.ModuleType('audit_bag')
+audit.__file__ = str(CHECKOUT / 'audit/audit_bag')
+_loader.exec_module(audit)
+audit.progress = lambda done, of: None
+
+
+def kind_of(row):
+    """What a refutation says, without its numbers and names: worlds that show the same fault have the same kind."""
+    words = re.sub(r'\[[^\]]*\]|\([^)]*\)', '#', row['reason'])
+    words = re.sub(r'\b(body\d|plate|finger|tool|wrist|joint\d|octomap|mount|self)\b', 'X', words)
+    return row['claim'] + ': ' + re.sub(r'-?\d[\d.e+-]*', 'N', re.sub(r'\b(vf|fv|ee|vx|ex|fx)\b', 'P', words))
+
+
+Verdict = collections.namedtuple('Verdict', 'refuted not_covered held statuses tame problem')
+
+
+def judge(world, folder):
+    """What analyze_bag says of the world, held against what came."""
+    folder = pathlib.Path(folder)
+    bag, params, out = folder / 'world.bag', folder / 'params.yaml', folder / 'out.bag'
+    with rosbag.Bag(str(bag), 'w') as written:
+        for topic, message, at, publisher in world.rows:
+            header = {'callerid': '/' + publisher.strip('/'), 'topic': topic, 'message_definition': message._full_text,
+                      'md5sum': message._md5sum, 'type': message._type, 'latching': '0'}
+            written.write(topic, message, worlds.stamp(at), connection_header=header)
+    params.write_text(yaml.safe_dump(world.params))
+    (folder / 'finger.obj').write_text(worlds.FINGER_OBJ)
+    (folder / 'arm.urdf').write_text(worlds.ROBOT)
+    ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--params', str(params), '-o', str(out), '--report', str(folder / 'report'),
+                          '--quiet'], capture_output=True, text=True, check=False)
+    if ran.returncode not in (0, 3):
+        return Verdict([], [], 0, collections.Counter(), world.tame, ran.stderr.strip()[-400:])
+    arguments = argparse.Namespace(steps=None, pairs=500)
+    with rosbag.Bag(str(bag)) as came, rosbag.Bag(str(out)) as said:
+        judged = audit.Judge(audit.World(came, yaml.safe_load(params.read_text()), None), audit.Claims(said), arguments)
+    judged.run()
+    statuses = collections.Counter('proved' if c['proved'] else 'not' for c in judged.said)
+    return Verdict(judged.refuted, judged.not_covered, judged.held, statuses, world.tame, '')
+
+
+def smaller(seed, folder, wanted):
+    """The fewest faults of the world that still show a refutation of this kind, by leaving out one after the other."""
+    world = worlds.World(seed, folder)
+    left = world.faults
+    for fault in list(left):
+        trial = worlds.World(seed, folder, )
+        keep = [f for f in left if f != fault]
+        trial = rebuilt(seed, folder, keep)
+        if wanted in {kind_of(r) for r in judge(trial, folder).refuted}:
+            left = keep
+    return left
+
+
+def rebuilt(seed, folder, keep):
+    """The same world with only these of its faults: the others are drawn, too, so that the rest stays as it is."""
+    class Some(worlds.World):
+        def fault(self, kind):
+            import copy
+            before = [row[:1] + [copy.deepcopy(row[1])] + row[2:] for row in self.rows]
+            super().fault(kind)
+            if self.faults[-1] not in keep:
+                self.rows = before
+    return Some(seed, folder)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument('--from', dest='first', type=int, default=1)
+    parser.add_argument('--worlds', type=int, default=300)
+    parser.add_argument('--log')
+    parser.add_argument('--keep')
+    arguments = parser.parse_args()
+    kinds, uncovered, total, proved, tame = collections.defaultdict(list), collections.Counter(), 0, collections.Counter(), []
+    begin = arguments.first
+    if arguments.log and os.path.exists(arguments.log):  # goes on where it ended
+        begin = max([begin] + [json.loads(line)['seed'] + 1 for line in open(arguments.log)])
+    for seed in range(begin, arguments.first + arguments.worlds):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = os.path.join(arguments.keep, str(seed)) if arguments.keep else folder
+            os.makedirs(folder, exist_ok=True)
+            world = worlds.World(seed, folder)
+            verdict = judge(world, folder)
+        row = {'seed': seed, 'kinds': sorted({kind_of(r) for r in verdict.refuted}), 'held': verdict.held, 'faults': world.faults,
+               'not_covered': [r['reason'] for r in verdict.not_covered], 'statuses': dict(verdict.statuses), 'problem': verdict.problem,
+               'first': verdict.refuted[:1], 'tame': world.tame}
+        if arguments.log:
+            with open(arguments.log, 'a') as log:
+                log.write(json.dumps(row) + '\n')
+        total += verdict.held
+        proved.update(verdict.statuses)
+        uncovered.update(row['not_covered'])
+        for kind in row['kinds']:
+            kinds[kind].append(seed)
+        if verdict.problem:
+            print(seed, verdict.problem, flush=True)
+    for kind, seeds in sorted(kinds.items(), key=lambda k: -len(k[1])):
+        print(len(seeds), kind, seeds[:6])
+    print('held', total, dict(proved), 'not covered', sum(uncovered.values()), dict(uncovered.most_common(8)))
+
+
+if __name__ == '__main__':
+    main()
