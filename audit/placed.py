@@ -80,9 +80,9 @@ class Transforms:
             samples.sort(key=lambda s: s.stamp)
         self.stamps = {child: [s.stamp for s in samples] for child, samples in self.samples.items()}
 
-    def judge(self, said, ahead):
-        """What is judged was said then, by somebody who knew /tf so far ahead, and the first of each static frame."""
-        self.said, self.read, self.poses = said, said + ahead, {}
+    def judge(self, said, ahead, begun):
+        """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
+        self.said, self.read, self.begun, self.poses = said, said + ahead, begun, {}
         if ahead:
             for samples in self.static.values():
                 samples[0].came = 0
@@ -94,12 +94,15 @@ class Transforms:
         """The two samples that a joint's place at a stamp rests on, or twice the one that it is."""
         fixed, moving = self.known(self.static.get(child, [])), self.samples.get(child, [])
         if fixed:
-            for other in fixed[:-1] + self.known(moving):
+            for a, b in zip(fixed, fixed[1:]):
+                if max(a.off(b)) > 1e-6 and self.begun < b.came < self.said:
+                    raise Unknown('the static frame %s was sent at another place within the step' % child)
+            for other in self.known(moving):
                 metres, angle = fixed[-1].off(other)
                 if other.parent != fixed[-1].parent or metres > 1e-3:
-                    raise Unknown('the static frame %s was sent at two places' % child)
+                    raise Unknown('frame %s is at two places, on /tf and on /tf_static' % child)
                 if metres > 1e-6 or angle > 1e-6:
-                    raise NotCovered('the static frame %s was sent at two places that are near to each other' % child)
+                    raise NotCovered('frame %s is on /tf and on /tf_static at places near to each other' % child)
             return fixed[-1], fixed[-1]
         stamps = self.stamps.get(child, [])
         i, j = bisect.bisect_right(stamps, stamp) - 1, bisect.bisect_left(stamps, stamp)
@@ -186,21 +189,30 @@ class Stream:
 
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
         self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
-        self.every, self.max_step_ns = sorted(frames, key=lambda f: f.stamp), max_step_ns
-        self.stamps = [f.stamp for f in self.every]
+        self.every, self.max_step_ns = frames, max_step_ns  # in the order in which they came
+        self.taken, self.until, self.held = 0, -1, []
+
+    def known(self):
+        """What had come when it was said, by stamp. One that goes back voids all that has a later stamp."""
+        if self.transforms.said < self.until:
+            self.taken, self.held = 0, []
+        self.until = self.transforms.said
+        while self.taken < len(self.every) and self.every[self.taken].came <= self.until:
+            frame = self.every[self.taken]
+            while self.held and self.held[-1].stamp > frame.stamp:
+                self.held.pop()
+            self.held.append(frame)
+            self.taken += 1
+        return self.held
 
     def around(self, start, end):
         """The frames that a step from start to end rests on."""
-        said, every = self.transforms.said, self.every
-        i, j = bisect.bisect_right(self.stamps, start) - 1, bisect.bisect_left(self.stamps, end)
-        while i >= 0 and every[i].came > said:
-            i -= 1
-        while j < len(every) and every[j].came > said:
-            j += 1
+        said, every = self.transforms.said, self.known()
+        stamps = [f.stamp for f in every]
+        i, j = bisect.bisect_right(stamps, start) - 1, bisect.bisect_left(stamps, end)
         if i < 0 or j >= len(every):
             raise Unknown('%s has no frames around the step' % self.name)
-        i, j = bisect.bisect_left(self.stamps, self.stamps[i]), bisect.bisect_right(self.stamps, self.stamps[j])
-        came = sorted((f for f in every[i:j] if f.came <= said), key=lambda f: (f.stamp, f.number))
+        came = every[bisect.bisect_left(stamps, stamps[i]):bisect.bisect_right(stamps, stamps[j])]
         frames = came[:1]
         for a, b in zip(came, came[1:]):
             if a.stamp != b.stamp:
@@ -258,13 +270,13 @@ class Held(Stream):
 
     def around(self, start, end):
         said = self.transforms.said
-        came = sorted((f for f in self.every if f.came <= said), key=lambda f: f.number)
+        came = [f for f in self.every if f.came <= said]
         if not came:
             raise Unknown('%s has not come' % self.name)
         if any(at > came[-1].came and at < said for _, _, at in self.refused):
             raise Unknown('the newest frame of %s was refused' % self.name)
-        if any(f.came >= said - self.timeout for f in came[1:]):
-            raise NotCovered('%s came anew within answer_timeout_s of the claim' % self.name)
+        if any(b.came - a.came <= self.max_step_ns and b.came >= said - self.timeout for a, b in zip(came, came[1:])):
+            raise NotCovered('%s comes more often than each max_step_s, and came anew within answer_timeout_s' % self.name)
         return came[-1:]
 
     def knots(self, start, end):

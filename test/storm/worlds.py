@@ -49,12 +49,15 @@ def octree(keys):
 class Way:
     """A place over time that goes to and fro, smoothly or in jerks, and an angle about an axis."""
 
-    def __init__(self, r, far, turn):
+    def __init__(self, r, far, turn, tame):
         self.middle = np.array([r.uniform(-.05, .05), r.uniform(-.05, .05), r.uniform(-.05, .15)]) * far
-        self.waves = [(r.uniform(0, .12) * far * (3 if i == 2 else 1), r.uniform(.5, 9), r.uniform(0, 6.3)) for i in range(3)]
-        self.jerks = [(r.uniform(0, 1.5), r.uniform(.01, .06), r.uniform(-.25, .25) * far) for _ in range(r.choice([0, 0, 1, 3]))]
+        calm = tame or r.random() < .6
+        self.waves = [(r.uniform(0, .03 if calm else .12) * far * (3 if i == 2 else 1), r.uniform(.3, 1.5 if calm else 9), r.uniform(0, 6.3))
+                      for i in range(3)]
+        self.jerks = [(r.uniform(0, 1.5), r.uniform(.01, .06), r.uniform(-.25, .25) * far) for _ in range(r.choice([0, 0, 1, 3]) * (not tame))]
         axis = np.array([r.gauss(0, 1) for _ in range(3)])
-        self.axis, self.turn = axis / np.linalg.norm(axis), (r.uniform(0, 2.5), r.uniform(.3, 5), r.uniform(0, 6.3)) if turn else (0, 1, 0)
+        self.axis = axis / np.linalg.norm(axis)
+        self.turn = (r.uniform(0, 2.5) * (.1 if calm else 1), r.uniform(.3, 1 if calm else 5), r.uniform(0, 6.3)) if turn else (0, 1, 0)
 
     def at(self, t):
         p = self.middle + [a * math.sin(w * t + f) for a, w, f in self.waves]
@@ -94,9 +97,9 @@ class World:
         for before, row in zip(self.rows, self.rows[1:]):  # no two at once
             row[2] = max(row[2], before[2] + 1000)
 
-    def ticks(self, hz, begin=0.0):
-        r, at = self.r, begin + self.r.uniform(0, 1 / hz)
-        while at < self.seconds:
+    def ticks(self, hz, before=0.0):
+        r, at = self.r, self.r.uniform(0, 1 / hz) - before
+        while at < self.seconds + before:
             yield at
             at += (1 if self.tame else r.uniform(.7, 1.3) if r.random() < .2 else 1) / hz
 
@@ -114,18 +117,18 @@ class World:
         self.chain, parent = [], 'world'
         for i in range(1 if self.tame else r.choice([1, 1, 2, 3, 4])):
             name = 'joint%d' % i
-            self.tf(name, parent, Way(r, .7 if i == 0 else .4, r.random() < .7))
+            self.tf(name, parent, Way(r, .7 if i == 0 else .4, r.random() < .7, self.tame))
             self.chain.append(name)
             parent = name
         self.mount = TransformStamped(child_frame_id='mount')
         self.mount.header.frame_id = 'world'
         self.mount.transform.translation.x, self.mount.transform.rotation.w = .02, 1
-        for _ in range(1 if self.tame else r.choice([1, 1, 2])):
-            self.add('/tf_static', TFMessage([self.mount]), r.choice([0, 0, r.uniform(0, self.seconds)]) if not self.tame else 0)
+        for k in range(1 if self.tame else r.choice([1, 1, 2])):
+            self.add('/tf_static', TFMessage([self.mount]), -.3 if self.tame or k == 0 else r.uniform(0, self.seconds))
 
     def tf(self, name, parent, way):
         delay = self.r.uniform(0, .02)
-        for at in self.ticks(self.r.choice([15, 30, 60, 100])):
+        for at in self.ticks(self.r.choice([15, 30, 30, 60, 100]), .2):
             one = TransformStamped(child_frame_id=name)
             one.header.frame_id, one.header.stamp = parent, stamp(self.ns(at))
             p, q = way.at(at)
@@ -138,19 +141,19 @@ class World:
     def stream(self, name, number, static=False):
         r = self.r
         kind = r.choice(['cloud', 'cloud', 'mesh', 'poses', 'soup'])
-        frame = 'world' if self.tame or r.random() < .6 else r.choice(self.chain + ['mount'])
+        frame = 'world' if self.tame or r.random() < .6 else r.choice(['mount'] if static else self.chain + ['mount'])
         settings = {'topic': '/' + name}
         rows, cols = r.choice([2, 3]), r.choice([2, 3, 4])
         if kind == 'cloud':
             settings['topology'] = {'rows': rows, 'cols': cols}
-        way, edge = Way(r, 1, False), r.choice([.05, .08, .12])
+        way, edge = Way(r, 1, False, self.tame), r.choice([.05, .08, .12])
         way.middle[2] += .06 * number if number < 9 else -.05
         flutter = (r.uniform(0, .02), r.uniform(1, 20))
         rest = [(edge * (i - rows / 2), edge * (j - cols / 2), 0) for i in range(rows) for j in range(cols)]
         if static:
-            settings['motion'], times = 'static', [0] + [r.uniform(0, self.seconds)] * (r.random() < .2)
+            settings['motion'], times = 'static', [-.1] + [r.uniform(0, self.seconds)] * (r.random() < .2)
         else:
-            times = list(self.ticks(r.choice([5, 10, 10, 15, 20, 30])))
+            times = list(self.ticks(r.choice([10, 10, 15, 20, 30])))
         delay = r.uniform(0, .03)
         for at in times:
             p, _ = way.at(at)
@@ -197,8 +200,8 @@ class World:
     def robot(self):
         r = self.r
         self.params['robot'] = {'description': self.folder + '/arm.urdf', 'own_voxels_m': 0, 'against_map': r.random() < .5}
-        self.tf('tool', self.chain[0], Way(r, .8, True))
-        self.tf('wrist', 'world', Way(r, .8, True))
+        self.tf('tool', self.chain[0], Way(r, .8, True, self.tame))
+        self.tf('wrist', 'world', Way(r, .8, True, self.tame))
 
     def map(self):
         r = self.r
@@ -218,7 +221,9 @@ class World:
     def options(self):
         r, p = self.r, self.params
         streams = [n for n, s in p['bodies'].items() if 'rigid' not in s and 'motion' not in s]
-        p['clock_body'] = r.choice(streams)
+        often = max(streams, key=lambda n: sum(row[0] == '/' + n for row in self.rows))
+        p['clock_body'] = often if self.tame or r.random() < .6 else r.choice(streams)
+        p['sync_timeout_s'] = .1 if r.random() < .2 else .5
         if r.random() < .3:
             p.update(accuracy='conservative', minimum_separation_m=r.choice([.002, .01]))
         if r.random() < .4:
@@ -229,8 +234,8 @@ class World:
             p['expected_contacts'] = [{'between': [names[0], r.choice(names[1:] + ['self', 'octomap'])]}]
         if r.random() < .2 and 'topology' in p['bodies'][streams[0]]:
             p['bodies'][streams[0]]['vertex_mask'] = [0]
-        if r.random() < .3:
-            p['rigid_tolerance_m'] = r.choice([1e-4, 3e-3])
+        if r.random() < .5:
+            p['rigid_tolerance_m'] = r.choice([1e-4, 3e-3, 1e-2, 1e-2])
         if r.random() < .3:
             p.update(r.choice([{'queue_size': 1}, {'transform_timeout_s': .05}, {'sync_timeout_s': .02}, {'max_step_s': .15},
                                {'octomap_timeout_s': .4}, {'answer_timeout_s': .1}, {'queue_policy': 'oldest'}]))
