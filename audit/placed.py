@@ -179,13 +179,24 @@ class Transforms:
         return all((p == poses[0]).all() for p in poses)
 
 
+class Track:
+    """One body: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen of it."""
+    moves = True
+
+    def turns(self, start, end):
+        return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
+
+    def loose(self, start, end):
+        """May the monitor take another path for its, within rigid_tolerance_m?"""
+        return bool(self.knots(start, end)) or self.turns(start, end)
+
+
 def carried(pose, points):
     return points if pose is None else points @ pose[:3, :3].T + pose[:3, 3]
 
 
-class Stream:
+class Stream(Track):
     """A body whose frames came as messages."""
-    moves = True
 
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
         self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
@@ -256,8 +267,8 @@ class Stream:
         frames = self.around(start, end)
         return frames[0].stamp == start and frames[-1].stamp == end and len(frames) == 2 and frames[0].frame == self.fixed
 
-    def turns(self, start, end):
-        return not self.transforms.still(self.around(start, end)[0].frame, self.fixed, start, end)
+    def carrier(self, start, end):
+        return self.around(start, end)[0].frame
 
 
 class Held(Stream):
@@ -301,10 +312,12 @@ class Held(Stream):
     def turns(self, start, end):
         return False
 
+    def loose(self, start, end):
+        return self.carrier(start, end) != self.fixed
 
-class Rigid:
+
+class Rigid(Track):
     """A mesh that a tf frame carries."""
-    moves = True
 
     def __init__(self, name, positions, surface, lost, frame, transforms, fixed, rough=0.0):
         self.name, self.positions, self.mesh, self.lost, self.rough = name, positions, surface, lost, rough
@@ -325,8 +338,8 @@ class Rigid:
     def exact(self, start, end):
         return self.frame == self.fixed
 
-    def turns(self, start, end):
-        return not self.transforms.still(self.frame, self.fixed, start, end)
+    def carrier(self, start, end):
+        return self.frame
 
 
 def pieces(tracks, start, end, tolerance):

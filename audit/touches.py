@@ -356,18 +356,24 @@ def box_gap(a0, a1, b0, b1):
     return np.linalg.norm(np.maximum(0, np.maximum(la - hb, lb - ha)), axis=1)
 
 
-def nearest(distance, starts, ends, rounds=24):
-    """Of pairs that move: the least distance found on the way and when. It may be less, never more, in truth."""
-    at_ = lambda t: distance(*[s + t[:, None, None] * (e - s) for s, e in zip(starts, ends)])
-    n = len(starts[0])
-    grid = [at_(np.full(n, t)) for t in np.linspace(0, 1, 9)]
-    middle = np.argmin(grid, 0) / 8
-    best, when = np.min(grid, 0), middle
-    low, high = np.maximum(0, middle - 0.125), np.minimum(1, middle + 0.125)
-    for _ in range(rounds):
-        x, y = low + (high - low) * 0.382, low + (high - low) * 0.618
-        dx, dy = at_(x), at_(y)
-        low, high = np.where(dx > dy, x, low), np.where(dx > dy, high, y)
-        for t, d in ((x, dx), (y, dy)):
-            when, best = np.where(d < best, t, when), np.minimum(best, d)
-    return best, when
+def nearest(distance, starts, ends, reach, rounds=12):
+    """Of pairs that move: which come nearer than the reach, the least distance found on the way, and when. It may be less, never more, in truth."""
+    at_ = lambda t, which: distance(*[s[which] + t[:, None, None] * (e[which] - s[which]) for s, e in zip(starts, ends)])
+    far = sum(np.linalg.norm(e - s, axis=2).max(1) for s, e in zip(starts, ends))  # a distance changes by no more
+    left = np.arange(len(far))
+    best, when = at_(np.full(len(left), 0.5), left), np.full(len(left), 0.5)
+    near = best - far / 2 < reach
+    left, best, when = left[near], best[near], when[near]
+    if rounds and len(left):
+        grid = [at_(np.full(len(left), t), left) for t in np.linspace(0, 1, 9)]
+        best, when = np.min(grid, 0), np.argmin(grid, 0) / 8
+        near = best - far[left] / 16 < reach
+        left, best, when = left[near], best[near], when[near]
+        low, high = np.maximum(0, when - 0.125), np.minimum(1, when + 0.125)
+        for _ in range(rounds if len(left) else 0):
+            x, y = low + (high - low) * 0.382, low + (high - low) * 0.618
+            dx, dy = at_(x, left), at_(y, left)
+            low, high = np.where(dx > dy, x, low), np.where(dx > dy, high, y)
+            for t, d in ((x, dx), (y, dy)):
+                when, best = np.where(d < best, t, when), np.minimum(best, d)
+    return left, best, when

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Runs worlds of the storm: storm.py [--from SEED] [--worlds N] [--log FILE] [--keep DIR]; a refuted world is made smaller and told."""
+"""Runs worlds of the storm: storm.py [--from SEED] [--worlds N | --cases] [--log FILE] [--keep DIR] [--smaller]; with --smaller it also says which
+faults of a refuted world are needed for what is refuted."""
 import argparse
 import collections
+import copy
 import importlib.machinery
-import importlib.util
 import json
 import os
 import pathlib
@@ -20,19 +21,19 @@ HERE = pathlib.Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
 TOOLS = pathlib.Path(os.environ.get('DEFORMABLE_CCD_WORKSPACE', CHECKOUT / 'build')) / 'devel/lib/deformable_ccd'
 sys.path.insert(0, str(HERE))
+import cases  # noqa: E402
 import worlds  # noqa: E402
 
-_loader = importlib.machinery.SourceFileLoader('audit_bag', str(CHECKOUT / 'audit/audit_bag'))
-audit = types.ModuleType('audit_bag')
+audit = types.ModuleType('audit_bag')  # a program without an ending
 audit.__file__ = str(CHECKOUT / 'audit/audit_bag')
-_loader.exec_module(audit)
+importlib.machinery.SourceFileLoader('audit_bag', audit.__file__).exec_module(audit)
 audit.progress = lambda done, of: None
 
 
 def kind_of(row):
     """What a refutation says, without its numbers and names: worlds that show the same fault have the same kind."""
     words = re.sub(r'\[[^\]]*\]|\([^)]*\)', '#', row['reason'])
-    words = re.sub(r'\b(body\d|plate|finger|tool|wrist|joint\d|octomap|mount|self)\b', 'X', words)
+    words = re.sub(r'\b(body\d|plate|finger|tool|wrist|joint\d|octomap|mount|self|object|sheet|table|rope)\b', 'X', words)
     return row['claim'] + ': ' + re.sub(r'-?\d[\d.e+-]*', 'N', re.sub(r'\b(vf|fv|ee|vx|ex|fx)\b', 'P', words))
 
 
@@ -63,64 +64,69 @@ def judge(world, folder):
     return Verdict(judged.refuted, judged.not_covered, judged.held, statuses, world.tame, '')
 
 
-def smaller(seed, folder, wanted):
-    """The fewest faults of the world that still show a refutation of this kind, by leaving out one after the other."""
-    world = worlds.World(seed, folder)
-    left = world.faults
-    for fault in list(left):
-        trial = worlds.World(seed, folder, )
-        keep = [f for f in left if f != fault]
-        trial = rebuilt(seed, folder, keep)
-        if wanted in {kind_of(r) for r in judge(trial, folder).refuted}:
-            left = keep
-    return left
-
-
 def rebuilt(seed, folder, keep):
     """The same world with only these of its faults: the others are drawn, too, so that the rest stays as it is."""
     class Some(worlds.World):
         def fault(self, kind):
-            import copy
-            before = [row[:1] + [copy.deepcopy(row[1])] + row[2:] for row in self.rows]
+            before = copy.deepcopy(self.rows)
             super().fault(kind)
             if self.faults[-1] not in keep:
                 self.rows = before
     return Some(seed, folder)
 
 
+def smaller(seed, folder, wanted):
+    """The fewest faults of the world that still show a refutation of this kind, by leaving out one after the other."""
+    left = worlds.World(seed, folder).faults
+    for fault in list(left):
+        keep = [f for f in left if f != fault]
+        if wanted in {kind_of(r) for r in judge(rebuilt(seed, folder, keep), folder).refuted}:
+            left = keep
+    return left
+
+
+def one(seed, folder, arguments):
+    """The row of the log: what became of a world."""
+    world = cases.case(seed, folder) if arguments.cases else worlds.World(seed, folder)
+    verdict = judge(world, folder)
+    row = {'seed': seed, 'kinds': sorted({kind_of(r) for r in verdict.refuted}), 'held': verdict.held, 'faults': world.faults,
+           'not_covered': [r['reason'] for r in verdict.not_covered], 'statuses': dict(verdict.statuses), 'problem': verdict.problem,
+           'first': verdict.refuted[:1], 'tame': world.tame}
+    if arguments.smaller and row['kinds'] and not arguments.cases:
+        row['needed'] = smaller(seed, folder, kind_of(verdict.refuted[0]))
+    return row
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument('--from', dest='first', type=int, default=1)
     parser.add_argument('--worlds', type=int, default=300)
+    parser.add_argument('--cases', action='store_true')
     parser.add_argument('--log')
     parser.add_argument('--keep')
+    parser.add_argument('--smaller', action='store_true')
     arguments = parser.parse_args()
-    kinds, uncovered, total, proved, tame = collections.defaultdict(list), collections.Counter(), 0, collections.Counter(), []
     begin = arguments.first
-    if arguments.log and os.path.exists(arguments.log):  # goes on where it ended
+    if arguments.log and os.path.exists(arguments.log) and not arguments.cases:  # goes on where it ended
         begin = max([begin] + [json.loads(line)['seed'] + 1 for line in open(arguments.log)])
-    for seed in range(begin, arguments.first + arguments.worlds):
+    kinds, uncovered, claims = collections.defaultdict(list), collections.Counter(), collections.Counter()
+    for seed in cases.CASES if arguments.cases else range(begin, arguments.first + arguments.worlds):
         with tempfile.TemporaryDirectory() as folder:
             folder = os.path.join(arguments.keep, str(seed)) if arguments.keep else folder
             os.makedirs(folder, exist_ok=True)
-            world = worlds.World(seed, folder)
-            verdict = judge(world, folder)
-        row = {'seed': seed, 'kinds': sorted({kind_of(r) for r in verdict.refuted}), 'held': verdict.held, 'faults': world.faults,
-               'not_covered': [r['reason'] for r in verdict.not_covered], 'statuses': dict(verdict.statuses), 'problem': verdict.problem,
-               'first': verdict.refuted[:1], 'tame': world.tame}
+            row = one(seed, folder, arguments)
         if arguments.log:
             with open(arguments.log, 'a') as log:
                 log.write(json.dumps(row) + '\n')
-        total += verdict.held
-        proved.update(verdict.statuses)
+        claims.update(row['statuses'])
         uncovered.update(row['not_covered'])
         for kind in row['kinds']:
             kinds[kind].append(seed)
-        if verdict.problem:
-            print(seed, verdict.problem, flush=True)
+        if row['problem']:
+            print(seed, row['problem'], flush=True)
     for kind, seeds in sorted(kinds.items(), key=lambda k: -len(k[1])):
         print(len(seeds), kind, seeds[:6])
-    print('held', total, dict(proved), 'not covered', sum(uncovered.values()), dict(uncovered.most_common(8)))
+    print(dict(claims), 'not covered', dict(uncovered.most_common(8)))
 
 
 if __name__ == '__main__':
