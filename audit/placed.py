@@ -175,7 +175,7 @@ class Transforms:
         """Does the chain not move in the step? Only then is a straight way in it a straight way."""
         if frame == fixed:
             return True
-        poses = [self.pose(frame, fixed, s) for s in [start] + self.knots(frame, fixed, start, end) + [end]]
+        poses = [self.pose(frame, fixed, s) for s in halves([start] + self.knots(frame, fixed, start, end) + [end])]
         return all((p == poses[0]).all() for p in poses)
 
 
@@ -189,6 +189,11 @@ class Track:
     def loose(self, start, end):
         """May the monitor take another path for its, within rigid_tolerance_m?"""
         return bool(self.knots(start, end)) or self.turns(start, end)
+
+
+def halves(stamps):
+    """With those in the middle: joints that turn against each other are elsewhere there."""
+    return sorted(stamps + [(a + b) // 2 for a, b in zip(stamps, stamps[1:])])
 
 
 def carried(pose, points):
@@ -295,7 +300,7 @@ class Held(Stream):
         held = self.at(start, start, end)
         try:
             knots = t.knots(frame.frame, self.fixed, start, end)
-            off = [np.abs(carried(t.pose(frame.frame, self.fixed, s), frame.positions) - held).max() for s in [start, end] + knots]
+            off = [np.abs(carried(t.pose(frame.frame, self.fixed, s), frame.positions) - held).max() for s in halves([start] + knots + [end])]
         except Unknown:
             return []  # what is not sent any more counts as at rest
         if max(off) > 2 * self.tolerance:

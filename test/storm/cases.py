@@ -266,6 +266,89 @@ def a_promise_about_a_finger_in_a_chain(c):
     c.finger('finger')
 
 
+def swing(c, child, far, times):
+    """At each sample the frame is `far` away along x, and between two of them it is nearer: two joints turn against each other."""
+    side = lambda t: (-1) ** int(round(t / .1))
+    c.tf('arm', times, angle=side)
+    for t in times:
+        one = TransformStamped(child_frame_id=child)
+        one.header.frame_id, one.header.stamp = 'arm', worlds.stamp(c.ns(t))
+        a = -side(t)  # back again
+        one.transform.translation.x, one.transform.translation.z = far * math.cos(a), -far * math.sin(a)
+        one.transform.rotation.y, one.transform.rotation.w = math.sin(a / 2), math.cos(a / 2)
+        c.add('/tf', TFMessage([one]), t, .0007)
+
+
+def a_map_in_a_frame_that_swings(c):
+    swing(c, 'cart', .6, every(.1, 1.1, -.1))
+    c.map([(0, 0, 0)], -.05, stamp_at=0, frame='cart')
+    c.body('sheet', [(x + .4, y, .02) for x, y, _ in SHEET], 3, every(.1))
+
+
+def a_static_body_in_a_frame_that_swings(c):
+    swing(c, 'cart', .6, every(.1, 1.1, -.1))
+    c.body('table', [(0, 0, -.02), (0, 0, .02), (.02, .02, -.02), (.02, .02, .02)], 2, [0], frame='cart', motion='static')
+    c.body('sheet', [(x + .4, y, 0) for x, y, _ in SHEET], 3, every(.1))
+
+
+def closed(c, name, at, z, size=.3, **settings):
+    c.params['bodies'][name] = {'topic': '/' + name, **settings}
+    message = worlds.MeshStamped(vertices=[worlds.Point(x * size, y * size, z + h * size) for x, y, h in (worlds.FINGER / .03).tolist()],
+                                 triangles=[worlds.MeshTriangle(f) for f in ((0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3))])
+    message.header.frame_id, message.header.stamp = 'world', worlds.stamp(c.ns(at))
+    c.add('/' + name, message, at)
+
+
+def a_closed_static_body_that_comes_around_another(c):
+    c.body('sheet', SMALL, 2, every(.1))
+    closed(c, 'table', -.05, 5, motion='static')
+    closed(c, 'table', .55, 0, motion='static')
+
+
+def a_closed_body_that_jumps_around_another(c):
+    c.body('sheet', SMALL, 2, every(.1))
+    for t in every(.1):
+        closed(c, 'object', t, 5 if t < .45 else 0)
+
+
+def a_finger_that_jumps_around_a_mesh(c):
+    c.body('sheet', [(.1 * x, .1 * y, -.01) for x, y, _ in SMALL], 2, every(.1))
+    c.tf('finger', every(.1, 1.1, -.1), z=lambda t: 2 if t < .45 else 0)
+    c.finger('finger')
+
+
+def a_finger_without_tf_that_comes_back_around_a_mesh(c):
+    c.body('sheet', [(.1 * x, .1 * y, -.01) for x, y, _ in SMALL], 2, every(.1, 2.0))
+    c.tf('finger', every(.02, .5, -.1), z=lambda t: .3)
+    c.tf('finger', every(.02, 2.1, 1.2))
+    c.finger('finger')
+
+
+def a_map_that_comes_around_a_mesh(c):
+    c.map([(9, 9, 9)], -.05)
+    c.body('sheet', SMALL, 2, every(.1))
+    c.map([(x, y, z) for x in range(-3, 3) for y in range(-3, 3) for z in range(-3, 3)], .45)
+
+
+def a_vertex_that_is_seen_only_at_one_end(c):
+    c.body('sheet', SHEET, 3, [t for t in every(.1) if t < .45])
+    c.body('sheet', SHEET[:4] + [(0, 0, float('nan'))] + SHEET[5:], 3, [.5])
+    c.body('sheet', SHEET, 3, [t for t in every(.1) if t > .55])
+    c.body('object', SMALL, 2, every(.1), z=lambda t: .05 - t * .1)
+
+
+def a_frame_that_comes_again_elsewhere_before_its_answer(c):
+    c.body('sheet', SHEET, 3, every(.1))
+    c.body('object', SMALL, 2, every(.15, 1.05), z=lambda t: .1)
+    c.body('sheet', SHEET, 3, [.5], z=lambda t: .2, delay=.02)
+
+
+def a_mesh_in_a_chain_of_which_a_joint_swings(c):
+    swing(c, 'hand', .6, every(.1, 1.1, -.1))
+    c.body('object', [(x, y, -.01 + h) for x, y, h in SMALL[:2]] + [(0, 0, .02), (.02, 0, .02)], 2, every(.1), frame='hand')
+    c.body('sheet', [(x + .35, y, 0) for x, y, _ in SHEET], 3, every(.1))
+
+
 CASES = {name: make for name, make in list(globals().items()) if callable(make) and getattr(make, '__code__', None)
          and make.__code__.co_varnames[:1] == ('c',) and make.__code__.co_argcount == 1}
 

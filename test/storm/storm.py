@@ -30,14 +30,30 @@ importlib.machinery.SourceFileLoader('audit_bag', audit.__file__).exec_module(au
 audit.progress = lambda done, of: None
 
 
-def kind_of(row):
-    """What a refutation says, without its numbers and names: worlds that show the same fault have the same kind."""
+def roles(world):
+    """What each name is, for the kinds: who is carried by tf, and who stands still."""
+    found = {name: 'frame' for row in world.rows if row[0].startswith('/tf') for t in row[1].transforms for name in (
+        t.child_frame_id, t.header.frame_id)}
+    found.update({'tool': 'link', 'wrist': 'link', 'octomap': 'map', 'self': 'itself'} if 'robot' in world.params else {'octomap': 'map', 'self': 'itself'})
+    for name, settings in world.params['bodies'].items():
+        header = next((row[1].header for row in world.rows if row[0] == '/' + name), None)
+        role = 'static mesh' if 'motion' in settings else 'mesh'
+        found[name] = 'rigid' if 'rigid' in settings else role if header is None or header.frame_id == 'world' else 'carried ' + role
+    return found
+
+
+def kind_of(row, role):
+    """What a refutation says, without its numbers and with what the names stand for: worlds of the same fault have the same kind."""
     words = re.sub(r'\[[^\]]*\]|\([^)]*\)', '#', row['reason'])
-    words = re.sub(r'\b(body\d|plate|finger|tool|wrist|joint\d|octomap|mount|self|object|sheet|table|rope)\b', 'X', words)
-    return row['claim'] + ': ' + re.sub(r'-?\d[\d.e+-]*', 'N', re.sub(r'\b(vf|fv|ee|vx|ex|fx)\b', 'P', words))
+    words = re.sub(r'\b(vf|fv|ee|vx|ex|fx)\b', 'P', words)
+    words = re.sub(r'-?\b\d[\d.e+-]*', 'N', ' '.join(role.get(word.strip(','), word) for word in words.split(' ')))
+    pair = re.match(r'(P #) of (.*) and # of (\S+( \S+)*?) (meet|are)(.*)', words)
+    if pair:  # of either order
+        words = '%s of %s and %s %s%s' % (pair.group(1), *sorted(pair.group(2, 3)), *pair.group(5, 6))
+    return row['claim'] + ': ' + words
 
 
-Verdict = collections.namedtuple('Verdict', 'refuted not_covered held statuses tame problem')
+Verdict = collections.namedtuple('Verdict', 'refuted kinds not_covered held statuses problem')
 
 
 def judge(world, folder):
@@ -55,13 +71,15 @@ def judge(world, folder):
     ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--params', str(params), '-o', str(out), '--report', str(folder / 'report'),
                           '--quiet'], capture_output=True, text=True, check=False)
     if ran.returncode not in (0, 3):
-        return Verdict([], [], 0, collections.Counter(), world.tame, ran.stderr.strip()[-400:])
+        return Verdict([], [], [], 0, collections.Counter(), ran.stderr.strip()[-400:])
     arguments = argparse.Namespace(steps=None, pairs=500)
     with rosbag.Bag(str(bag)) as came, rosbag.Bag(str(out)) as said:
         judged = audit.Judge(audit.World(came, yaml.safe_load(params.read_text()), None), audit.Claims(said), arguments)
     judged.run()
     statuses = collections.Counter('proved' if c['proved'] else 'not' for c in judged.said)
-    return Verdict(judged.refuted, judged.not_covered, judged.held, statuses, world.tame, '')
+    role = roles(world)
+    kinds = sorted({kind_of(row, role) for row in judged.refuted})
+    return Verdict(judged.refuted, kinds, judged.not_covered, judged.held, statuses, '')
 
 
 def rebuilt(seed, folder, keep):
@@ -80,7 +98,7 @@ def smaller(seed, folder, wanted):
     left = worlds.World(seed, folder).faults
     for fault in list(left):
         keep = [f for f in left if f != fault]
-        if wanted in {kind_of(r) for r in judge(rebuilt(seed, folder, keep), folder).refuted}:
+        if wanted in judge(rebuilt(seed, folder, keep), folder).kinds:
             left = keep
     return left
 
@@ -89,11 +107,11 @@ def one(seed, folder, arguments):
     """The row of the log: what became of a world."""
     world = cases.case(seed, folder) if arguments.cases else worlds.World(seed, folder)
     verdict = judge(world, folder)
-    row = {'seed': seed, 'kinds': sorted({kind_of(r) for r in verdict.refuted}), 'held': verdict.held, 'faults': world.faults,
+    row = {'seed': seed, 'kinds': verdict.kinds, 'held': verdict.held, 'faults': world.faults,
            'not_covered': [r['reason'] for r in verdict.not_covered], 'statuses': dict(verdict.statuses), 'problem': verdict.problem,
            'first': verdict.refuted[:1], 'tame': world.tame}
     if arguments.smaller and row['kinds'] and not arguments.cases:
-        row['needed'] = smaller(seed, folder, kind_of(verdict.refuted[0]))
+        row['needed'] = smaller(seed, folder, verdict.kinds[0])
     return row
 
 
