@@ -7,7 +7,8 @@ import os
 import re
 import struct
 import subprocess
-from dataclasses import dataclass, field
+import xml.etree.ElementTree as xml
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Surface:
             self.pieces = joined
 
     def same_as(self, other):
-        return (self.vertices == other.vertices and np.array_equal(self.edges, other.edges)
+        return self is other or (self.vertices == other.vertices and np.array_equal(self.edges, other.edges)
                 and np.array_equal(np.unique(np.sort(self.faces, 1), axis=0), np.unique(np.sort(other.faces, 1), axis=0)))
 
 
@@ -378,6 +379,50 @@ def read_ply(path):
     return vertices, polygons, lines
 
 
+# -- robots -------------------------------------------------------------------------------------------------------------
+
+
+def links(path, files):
+    """Each collision element of a URDF: link, positions, surface, lost, and how far its round parts lie within the true ones."""
+    tree = xml.parse(path).getroot()
+    for link in tree.findall('link'):
+        for element in link.findall('collision'):
+            shape = element.find('geometry')[0]
+            numbers = lambda name, default='0 0 0', of=shape: [float(w) for w in of.get(name, default).split()]
+            rough = 0.0
+            if shape.tag == 'box':
+                points, lost = np.array([[x, y, z] for z in (-.5, .5) for y in (-.5, .5) for x in (-.5, .5)]) * numbers('size'), 0
+                faces = [f for a, b, c, d in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+                         for f in ((a, b, c), (a, c, d))]
+                surface = Surface(8, np.array(faces))
+            elif shape.tag in ('cylinder', 'sphere'):
+                radius, lost = float(shape.get('radius')), 0
+                half = float(shape.get('length')) / 2 if shape.tag == 'cylinder' else 0
+                rings = [(radius, -half), (radius, half)] if half else [
+                    (radius * np.sin(a), -radius * np.cos(a)) for a in np.linspace(0, np.pi, 17)[1:-1]]
+                turn = np.arange(32) * np.pi / 16
+                points = np.concatenate([np.stack([r * np.cos(turn), r * np.sin(turn), 0 * turn + z], 1) for r, z in rings] + [
+                    [[0, 0, -(half or radius)], [0, 0, half or radius]]])
+                faces, top, i = [], 32 * len(rings), np.arange(32)
+                for k in range(len(rings) - 1):
+                    a, b, c, d = 32 * k + i, 32 * k + (i + 1) % 32, 32 * k + 32 + i, 32 * k + 32 + (i + 1) % 32
+                    faces += [np.stack([a, b, c], 1), np.stack([b, d, c], 1)]
+                faces += [np.stack([0 * i + top, (i + 1) % 32, i], 1), np.stack([0 * i + top + 1, top - 32 + i, top - 32 + (i + 1) % 32], 1)]
+                surface, rough = Surface(len(points), np.concatenate(faces)), radius * 0.0049
+            elif shape.tag == 'mesh':
+                points, surface, lost = files.mesh(shape.get('filename'))
+                points = points * numbers('scale', '1 1 1')
+            else:
+                raise NotCovered('a link of shape %s' % shape.tag)
+            origin = element.find('origin')
+            if origin is not None:
+                r, p, y = [a / 2 for a in numbers('rpy', of=origin)]
+                (cr, cp, cy), (sr, sp, sy) = np.cos([r, p, y]), np.sin([r, p, y])
+                q = (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
+                points = turned(q, points) + numbers('xyz', of=origin)
+            yield link.get('name'), points, surface, lost, rough
+
+
 # -- octomaps -----------------------------------------------------------------------------------------------------------
 
 
@@ -396,6 +441,24 @@ class Map:
     def boxes(self):
         keys = self.corners.astype(float) - 32768
         return keys * self.resolution, (keys + self.sizes[:, None]) * self.resolution
+
+    def without(self, boxes, carry):
+        """The map without the finest voxels whose centre, carried into the boxes' frame, lies in one of them."""
+        corners, sizes, kept = self.corners, self.sizes, []
+        while len(sizes):
+            middle = carry((corners - 32768 + sizes[:, None] / 2) * self.resolution)
+            reach = ((sizes - 1) / 2 * self.resolution * 3 ** 0.5)[:, None]
+            out, gone = np.ones(len(sizes), bool), np.zeros(len(sizes), bool)
+            for box in boxes:
+                low, high = np.array(box[:3]) - 1e-9, np.array(box[3:]) + 1e-9
+                out &= ((middle + reach < low) | (middle - reach > high)).any(1)
+                gone |= ((middle - reach >= low) & (middle + reach <= high)).all(1)
+            kept.append((corners[out], sizes[out]))
+            split = ~out & ~gone & (sizes > 1)
+            half = sizes[split] // 2
+            corners = np.concatenate([corners[split] + half[:, None] * [i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
+            sizes = np.tile(half, 8)
+        return replace(self, corners=np.concatenate([c for c, _ in kept] or [corners]), sizes=np.concatenate([n for _, n in kept] or [sizes]))
 
 
 def leaves_of(data, binary, bytes_a_node=4):

@@ -1,8 +1,8 @@
-"""Where it was: each body over a step, from the samples that came.
+"""Where it was: each body over a step, from the samples that had come when the claim was made.
 
 A mesh goes straight from frame to frame in the frame that carries it, and that goes as tf has it: each joint of the chain
 by itself, its translation straight, its rotation about one axis, between the two samples around the time. Nothing is
-known before the first sample of a moving joint or after its last one.
+known before the first sample of a moving joint or after its last one. A static frame has one place, from when it came.
 """
 import bisect
 from dataclasses import dataclass
@@ -31,6 +31,12 @@ class Sample:
         numbers = np.concatenate([self.translation, self.rotation])
         return bool(np.isfinite(numbers).all()) and abs(np.linalg.norm(self.rotation) - 1) <= 0.005
 
+    def off(self, other):
+        """How far the two are apart: metres, and the angle."""
+        p, q = (s.rotation / np.linalg.norm(s.rotation) for s in (self, other))
+        turn = 2 * np.arcsin(min(1.0, min(np.linalg.norm(p - q), np.linalg.norm(p + q)) / 2)) * 2
+        return np.abs(self.translation - other.translation).max(), turn
+
 
 def matrix(translation, rotation):
     x, y, z, w = rotation / np.linalg.norm(rotation)
@@ -55,8 +61,8 @@ def between(a, b, share):
 
 class Transforms:
     def __init__(self):
-        self.samples = {}  # of each child frame
-        self.unusable = []
+        self.samples, self.static, self.unusable = {}, {}, {}  # of each child frame
+        self.said = None  # only what came until then counts
 
     def add(self, message, static, came):
         for t in message.transforms:
@@ -64,113 +70,178 @@ class Transforms:
             sample = Sample(t.header.stamp.to_nsec(), t.header.frame_id.lstrip('/'), np.array([v.x, v.y, v.z]),
                             np.array([q.x, q.y, q.z, q.w]), static, came)
             child = t.child_frame_id.lstrip('/')
+            kept = self.unusable
             if sample.usable() and child and sample.parent and child != sample.parent:
-                self.samples.setdefault(child, []).append(sample)
-            else:
-                self.unusable.append((child, sample))
+                kept = self.static if static else self.samples
+            kept.setdefault(child, []).append(sample)
 
     def finish(self):
-        for child, samples in self.samples.items():
+        for samples in self.samples.values():
             samples.sort(key=lambda s: s.stamp)
+        self.stamps = {child: [s.stamp for s in samples] for child, samples in self.samples.items()}
 
-    def chain(self, frame, fixed):
-        """Frames from `frame` up to the fixed one, and from the fixed one up to where they meet."""
+    def judge(self, said, ahead, begun):
+        """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
+        self.said, self.read, self.begun, self.poses = said, said + ahead, begun, {}
+        if ahead:
+            for samples in self.static.values():
+                samples[0].came = 0
+
+    def known(self, samples):
+        return [s for s in samples if s.came <= (self.said if s.static else self.read)]
+
+    def around(self, child, stamp):
+        """The two samples that a joint's place at a stamp rests on, or twice the one that it is."""
+        fixed, moving = self.known(self.static.get(child, [])), self.samples.get(child, [])
+        if fixed:
+            for a, b in zip(fixed, fixed[1:]):
+                if max(a.off(b)) > 1e-6 and self.begun < b.came < self.said:
+                    raise Unknown('the static frame %s was sent at another place within the step' % child)
+            for other in self.known(moving):
+                metres, angle = fixed[-1].off(other)
+                if other.parent != fixed[-1].parent or metres > 1e-3:
+                    raise Unknown('frame %s is at two places, on /tf and on /tf_static' % child)
+                if metres > 1e-6 or angle > 1e-6:
+                    raise NotCovered('frame %s is on /tf and on /tf_static at places near to each other' % child)
+            return fixed[-1], fixed[-1]
+        stamps = self.stamps.get(child, [])
+        i, j = bisect.bisect_right(stamps, stamp) - 1, bisect.bisect_left(stamps, stamp)
+        while i >= 0 and moving[i].came > self.read:
+            i -= 1
+        while j < len(moving) and moving[j].came > self.read:
+            j += 1
+        if i < 0 or j == len(moving):
+            raise Unknown('no transform of %s at %.9f s' % (child, stamp / NS))
+        for k in (i, j):
+            for other in self.known(moving[bisect.bisect_left(stamps, stamps[k]):bisect.bisect_right(stamps, stamps[k])]):
+                if other.came < self.read and max(other.off(moving[k])) > 1e-6:
+                    raise Unknown('frame %s was at two places at the stamp %.9f s' % (child, stamps[k] / NS))
+        if moving[i].parent != moving[j].parent:
+            raise Unknown('frame %s changes its parent at %.9f s' % (child, stamp / NS))
+        return moving[i], moving[j]
+
+    def chain(self, frame, fixed, stamp):
+        """Joints from `frame` up to where it meets the way of the fixed one, and those of the fixed one: (child, a, b)."""
         ways = []
         for name in (frame, fixed):
-            way = [name]
-            while way[-1] in self.samples:
-                parents = {s.parent for s in self.samples[way[-1]]}
-                if len(parents) > 1:
-                    raise NotCovered('frame %s has had several parents' % way[-1])
-                way.append(parents.pop())
+            way = []
+            while name in self.samples or self.known(self.static.get(name, [])):
+                way.append((name,) + self.around(name, stamp))
+                name = way[-1][1].parent
                 if len(way) > 1000:
                     raise NotCovered('a ring of frames')
-            ways.append(way)
-        up, down = ways
-        meet = next((f for f in up if f in down), None)
+            ways.append((way, [w[0] for w in way] + [name]))
+        (up, names), (down, others) = ways
+        meet = next((n for n in names if n in others), None)
         if meet is None:
             raise Unknown('no transform from %s to %s' % (frame, fixed))
-        return up[:up.index(meet)], down[:down.index(meet)]
-
-    def joint(self, child, stamp):
-        samples = self.samples[child]
-        if any(s.static for s in samples):
-            first = samples[0]
-            if any((s.translation != first.translation).any() or (s.rotation != first.rotation).any() for s in samples):
-                raise NotCovered('the static frame %s was sent at several places' % child)
-            return matrix(first.translation, first.rotation)
-        i = bisect.bisect_left([s.stamp for s in samples], stamp)
-        if i < len(samples) and samples[i].stamp == stamp:
-            twice = samples[i:i + 2]
-            if len(twice) == 2 and twice[1].stamp == stamp and (
-                    (twice[0].translation != twice[1].translation).any() or (twice[0].rotation != twice[1].rotation).any()):
-                raise Unknown('frame %s was at two places at the stamp %d' % (child, stamp))
-            return matrix(samples[i].translation, samples[i].rotation)
-        if i == 0 or i == len(samples):
-            raise Unknown('no transform of %s at %.9f s' % (child, stamp / NS))
-        a, b = samples[i - 1], samples[i]
-        return between(a, b, (stamp - a.stamp) / (b.stamp - a.stamp))
+        return up[:names.index(meet)], down[:others.index(meet)]
 
     def pose(self, frame, fixed, stamp):
         """4 x 4, or None where the frame is the fixed one."""
         if frame == fixed:
             return None
-        up, down = self.chain(frame, fixed)
-        m = np.eye(4)
-        for child in up:
-            m = self.joint(child, stamp) @ m
-        other = np.eye(4)
-        for child in down:
-            other = self.joint(child, stamp) @ other
-        return np.linalg.inv(other) @ m
+        key = frame, fixed, stamp
+        if key not in self.poses:
+            ways = []
+            for way in self.chain(frame, fixed, stamp):
+                m = np.eye(4)
+                for _, a, b in way:
+                    share = (stamp - a.stamp) / (b.stamp - a.stamp) if a is not b and a.stamp != b.stamp else 0.0
+                    m = (between(a, b, share) if share else matrix(a.translation, a.rotation)) @ m
+                ways.append(m)
+            self.poses[key] = np.linalg.inv(ways[1]) @ ways[0]
+        return self.poses[key]
 
     def knots(self, frame, fixed, start, end):
-        """Stamps of the samples within the step; an unusable one there is a place that nobody knows."""
+        """Stamps of the samples within the step; one that cannot be used, around it, is a place that nobody knows."""
         if frame == fixed:
             return []
-        up, down = self.chain(frame, fixed)
+        first, last = (sum(self.chain(frame, fixed, s), []) for s in (start, end))
+        if [(c, a.parent) for c, a, _ in first] != [(c, a.parent) for c, a, _ in last]:
+            raise Unknown('what carries %s has another parent within the step' % frame)
         found = set()
-        for child in up + down:
-            for name, sample in self.unusable:
-                if name == child and start < sample.stamp < end:
+        for (child, a, _), (_, _, b) in zip(first, last):
+            for sample in self.unusable.get(child, []):
+                if not a.static and a.stamp < sample.stamp < b.stamp and sample.came < self.read:
                     raise Unknown('a transform of %s that cannot be used came for %.9f s' % (child, sample.stamp / NS))
-            found |= {s.stamp for s in self.samples[child] if start < s.stamp < end and not s.static}
+            within = [s for s in self.samples.get(child, []) if start < s.stamp < end and s.came < self.read and not a.static]
+            if any(s.parent != a.parent for s in within):
+                raise Unknown('frame %s changes its parent within the step' % child)
+            found |= {s.stamp for s in within}
         return sorted(found)
 
     def still(self, frame, fixed, start, end):
         """Does the chain not move in the step? Only then is a straight way in it a straight way."""
         if frame == fixed:
             return True
-        stamps = [start] + self.knots(frame, fixed, start, end) + [end]
-        poses = [self.pose(frame, fixed, s) for s in stamps]
+        poses = [self.pose(frame, fixed, s) for s in halves([start] + self.knots(frame, fixed, start, end) + [end])]
         return all((p == poses[0]).all() for p in poses)
+
+
+class Track:
+    """One body: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen of it."""
+    moves = True
+
+    def turns(self, start, end):
+        return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
+
+    def loose(self, start, end):
+        """May the monitor take another path for its, within rigid_tolerance_m?"""
+        return bool(self.knots(start, end)) or self.turns(start, end)
+
+
+def halves(stamps):
+    """With those in the middle: joints that turn against each other are elsewhere there."""
+    return sorted(stamps + [(a + b) // 2 for a, b in zip(stamps, stamps[1:])])
 
 
 def carried(pose, points):
     return points if pose is None else points @ pose[:3, :3].T + pose[:3, 3]
 
 
-class Stream:
+class Stream(Track):
     """A body whose frames came as messages."""
 
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
-        self.name, self.frames, self.refused = name, frames, refused
-        self.transforms, self.fixed, self.max_step_ns = transforms, fixed, max_step_ns
-        self.stamps = [f.stamp for f in frames]
+        self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
+        self.every, self.max_step_ns = frames, max_step_ns  # in the order in which they came
+        self.taken, self.until, self.held = 0, -1, []
+
+    def known(self):
+        """What had come when it was said, by stamp. One that goes back voids all that has a later stamp."""
+        if self.transforms.said < self.until:
+            self.taken, self.held = 0, []
+        self.until = self.transforms.said
+        while self.taken < len(self.every) and self.every[self.taken].came <= self.until:
+            frame = self.every[self.taken]
+            while self.held and self.held[-1].stamp > frame.stamp:
+                self.held.pop()
+            self.held.append(frame)
+            self.taken += 1
+        return self.held
 
     def around(self, start, end):
         """The frames that a step from start to end rests on."""
-        i, j = bisect.bisect_right(self.stamps, start) - 1, bisect.bisect_left(self.stamps, end)
-        if i < 0 or j == len(self.stamps):
+        said, every = self.transforms.said, self.known()
+        stamps = [f.stamp for f in every]
+        i, j = bisect.bisect_right(stamps, start) - 1, bisect.bisect_left(stamps, end)
+        if i < 0 or j >= len(every):
             raise Unknown('%s has no frames around the step' % self.name)
-        frames = self.frames[i:j + 1]
+        came = every[bisect.bisect_left(stamps, stamps[i]):bisect.bisect_right(stamps, stamps[j])]
+        frames = came[:1]
+        for a, b in zip(came, came[1:]):
+            if a.stamp != b.stamp:
+                frames.append(b)
+            elif b.came < said and not (b.frame == a.frame and np.array_equal(a.positions, b.positions, equal_nan=True)):
+                raise Unknown('%s was at two places at the stamp %.9f s' % (self.name, a.stamp / NS))
         for a, b in zip(frames, frames[1:]):
             if not a.surface.same_as(b.surface):
                 raise Unknown('%s became another mesh within the step' % self.name)
             if b.stamp - a.stamp > self.max_step_ns:
                 raise Unknown('%s has a gap of %.3f s within the step' % (self.name, (b.stamp - a.stamp) / NS))
-        for stamp, why in self.refused:
-            if frames[0].stamp < stamp < frames[-1].stamp:
+        for stamp, why, at in self.refused:
+            if frames[0].stamp < stamp < frames[-1].stamp and at < said:
                 raise Unknown('a frame of %s came for %.9f s and cannot be used: %s' % (self.name, stamp / NS, why))
         return frames
 
@@ -182,6 +253,8 @@ class Stream:
 
     def knots(self, start, end):
         frames = self.around(start, end)
+        if len({f.frame for f in frames}) > 1:
+            raise NotCovered('%s comes in several frames' % self.name)
         return [f.stamp for f in frames if start < f.stamp < end] + self.transforms.knots(frames[0].frame, self.fixed, start, end)
 
     def at(self, stamp, start, end):
@@ -199,15 +272,60 @@ class Stream:
         frames = self.around(start, end)
         return frames[0].stamp == start and frames[-1].stamp == end and len(frames) == 2 and frames[0].frame == self.fixed
 
+    def carrier(self, start, end):
+        return self.around(start, end)[0].frame
+
+
+class Held(Stream):
+    """A static body: its newest frame holds at all times, at the place that the frame's own stamp gives it."""
+    moves = False
+
+    def __init__(self, *words, tolerance, timeout):
+        super().__init__(*words)
+        self.tolerance, self.timeout = tolerance, timeout
+
+    def around(self, start, end):
+        said = self.transforms.said
+        came = [f for f in self.every if f.came <= said]
+        if not came:
+            raise Unknown('%s has not come' % self.name)
+        if any(at > came[-1].came and at < said for _, _, at in self.refused):
+            raise Unknown('the newest frame of %s was refused' % self.name)
+        if any(b.came - a.came <= self.max_step_ns and b.came >= said - self.timeout for a, b in zip(came, came[1:])):
+            raise NotCovered('%s comes more often than each max_step_s, and came anew within answer_timeout_s' % self.name)
+        return came[-1:]
+
+    def knots(self, start, end):
+        frame, t = self.around(start, end)[0], self.transforms
+        held = self.at(start, start, end)
+        try:
+            knots = t.knots(frame.frame, self.fixed, start, end)
+            off = [np.abs(carried(t.pose(frame.frame, self.fixed, s), frame.positions) - held).max() for s in halves([start] + knots + [end])]
+        except Unknown:
+            return []  # what is not sent any more counts as at rest
+        if max(off) > 2 * self.tolerance:
+            raise Unknown('tf has %s elsewhere in the step than where its frame was' % self.name)
+        return []
+
+    def at(self, stamp, start, end):
+        frame = self.around(start, end)[0]
+        return carried(self.transforms.pose(frame.frame, self.fixed, frame.stamp), frame.positions)
+
+    def exact(self, start, end):
+        return self.around(start, end)[0].frame == self.fixed
+
     def turns(self, start, end):
-        return not self.transforms.still(self.around(start, end)[0].frame, self.fixed, start, end)
+        return False
+
+    def loose(self, start, end):
+        return self.carrier(start, end) != self.fixed
 
 
-class Rigid:
+class Rigid(Track):
     """A mesh that a tf frame carries."""
 
-    def __init__(self, name, positions, surface, lost, frame, transforms, fixed):
-        self.name, self.positions, self.mesh, self.lost = name, positions, surface, lost
+    def __init__(self, name, positions, surface, lost, frame, transforms, fixed, rough=0.0):
+        self.name, self.positions, self.mesh, self.lost, self.rough = name, positions, surface, lost, rough
         self.frame, self.transforms, self.fixed = frame, transforms, fixed
 
     def surface(self, start, end):
@@ -225,8 +343,8 @@ class Rigid:
     def exact(self, start, end):
         return self.frame == self.fixed
 
-    def turns(self, start, end):
-        return not self.transforms.still(self.frame, self.fixed, start, end)
+    def carrier(self, start, end):
+        return self.frame
 
 
 def pieces(tracks, start, end, tolerance):

@@ -312,3 +312,68 @@ def apart(a0, a1, b0, b1, distance=0.0):
         result[left[away]] = True
         left = left[~away]
     return result
+
+
+# -- how near, in doubles: of n pairs at rest (n x corners x 3) --------------------------------------------------------
+
+
+def point_to_line(p, a, b):
+    u = b - a
+    square = np.einsum('ni,ni->n', u, u)
+    t = np.clip(np.einsum('ni,ni->n', p - a, u) / np.where(square > 0, square, 1), 0, 1)
+    return np.linalg.norm(p - a - t[:, None] * u, axis=1)
+
+
+def point_to_face(p, f):
+    best = np.minimum(point_to_line(p, f[:, 0], f[:, 1]), point_to_line(p, f[:, 1], f[:, 2]))
+    best = np.minimum(best, point_to_line(p, f[:, 2], f[:, 0]))
+    n = np.cross(f[:, 1] - f[:, 0], f[:, 2] - f[:, 0])
+    sides = [np.einsum('ni,ni->n', np.cross(f[:, (i + 1) % 3] - f[:, i], p - f[:, i]), n) for i in range(3)]
+    above = np.abs(np.einsum('ni,ni->n', unit(n), p - f[:, 0]))
+    return np.where((np.min(sides, 0) > 0), np.minimum(above, best), best)
+
+
+def line_to_line(p, q):
+    best = np.min([point_to_line(p[:, 0], q[:, 0], q[:, 1]), point_to_line(p[:, 1], q[:, 0], q[:, 1]),
+                   point_to_line(q[:, 0], p[:, 0], p[:, 1]), point_to_line(q[:, 1], p[:, 0], p[:, 1])], 0)
+    u, v, w = p[:, 1] - p[:, 0], q[:, 1] - q[:, 0], p[:, 0] - q[:, 0]
+    dot_ = lambda x, y: np.einsum('ni,ni->n', x, y)
+    a, b, c, d, e = dot_(u, u), dot_(u, v), dot_(v, v), dot_(u, w), dot_(v, w)
+    area = a * c - b * b
+    some = np.where(area > 1e-12 * a * c, area, 1)
+    s, t = (b * e - c * d) / some, (a * e - b * d) / some
+    within = (area > 1e-12 * a * c) & (s > 0) & (s < 1) & (t > 0) & (t < 1)
+    return np.where(within, np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1), best)
+
+
+def point_to_box(p, low, high):
+    return np.linalg.norm(np.maximum(0, np.maximum(low - p, p - high)), axis=1)
+
+
+def box_gap(a0, a1, b0, b1):
+    """How far apart the boxes of all that the two sweep are."""
+    (la, ha), (lb, hb) = ((np.concatenate(p, 1).min(1), np.concatenate(p, 1).max(1)) for p in ((a0, a1), (b0, b1)))
+    return np.linalg.norm(np.maximum(0, np.maximum(la - hb, lb - ha)), axis=1)
+
+
+def nearest(distance, starts, ends, reach, rounds=12):
+    """Of pairs that move: which come nearer than the reach, the least distance found on the way, and when. It may be less, never more, in truth."""
+    at_ = lambda t, which: distance(*[s[which] + t[:, None, None] * (e[which] - s[which]) for s, e in zip(starts, ends)])
+    far = sum(np.linalg.norm(e - s, axis=2).max(1) for s, e in zip(starts, ends))  # a distance changes by no more
+    left = np.arange(len(far))
+    best, when = at_(np.full(len(left), 0.5), left), np.full(len(left), 0.5)
+    near = best - far / 2 < reach
+    left, best, when = left[near], best[near], when[near]
+    if rounds and len(left):
+        grid = [at_(np.full(len(left), t), left) for t in np.linspace(0, 1, 9)]
+        best, when = np.min(grid, 0), np.argmin(grid, 0) / 8
+        near = best - far[left] / 16 < reach
+        left, best, when = left[near], best[near], when[near]
+        low, high = np.maximum(0, when - 0.125), np.minimum(1, when + 0.125)
+        for _ in range(rounds if len(left) else 0):
+            x, y = low + (high - low) * 0.382, low + (high - low) * 0.618
+            dx, dy = at_(x, left), at_(y, left)
+            low, high = np.where(dx > dy, x, low), np.where(dx > dy, high, y)
+            for t, d in ((x, dx), (y, dy)):
+                when, best = np.where(d < best, t, when), np.minimum(best, d)
+    return left, best, when

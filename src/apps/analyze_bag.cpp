@@ -191,7 +191,8 @@ int analyze(const Arguments& a) {
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
-        report.add(outcome, pipeline.monitor().bodies());
+        const std::vector<Body>& bodies = pipeline.monitor().bodies();
+        report.add(outcome, bodies, static_cast<std::int64_t>(at.toNSec()), bodies[config.monitor.clock_body].name);
         answered = answered || outcome.answered;
         if (out) out->add(outcome, pipeline, so_far, at);
       },

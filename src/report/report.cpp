@@ -89,7 +89,7 @@ Report::Report(const std::string& folder) : folder_(folder), clearance_(folder +
   steps_
       << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
          "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,"
-         "elementary_pairs,obstacle_pairs\n";
+         "elementary_pairs,obstacle_pairs,proved,told_ns,map_stamp_ns,map_came_ns,clock_body\n";
 #define DCCD_NAME_COLUMNS(member, published) writeNames(patches_, #member, Patch().member);
   patches_ << "step,stamp_ns";
   DCCD_PUBLISHED_PATCH_FIELDS(DCCD_NAME_COLUMNS)
@@ -140,7 +140,7 @@ void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodie
   }
 }
 
-void Report::writeStep(const Outcome& o) {
+void Report::writeStep(const Outcome& o, std::int64_t told_ns, const std::string& clock_body) {
   const StepStats& s = o.stats;
   steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
          << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << assuranceOf(o).clear()
@@ -149,7 +149,13 @@ void Report::writeStep(const Outcome& o) {
          << ',';
   if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
   steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
-         << s[Stage::OBSTACLE].in << '\n';
+         << s[Stage::OBSTACLE].in << ',' << assuranceOf(o).proved << ',' << told_ns << ',';
+  // Of several maps of one stamp the time at which it came tells which it was.
+  const bool has_map = o.answered && o.step && o.step->map.surface;
+  if (has_map) steps_ << o.step->map.stamp_ns;
+  steps_ << ',';
+  if (has_map) steps_ << o.step->map.arrival_ns;
+  steps_ << ',' << csvField(clock_body) << '\n';
 }
 
 void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
@@ -195,9 +201,10 @@ void Report::addTimes(const Outcome& o) {
   total_ms_.push_back(o.stats.total_ms);
 }
 
-void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
+void Report::add(const Outcome& o, const std::vector<Body>& bodies, std::int64_t told_ns,
+                 const std::string& clock_body) {
   if (frames_ == 0) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
-  writeStep(o);
+  writeStep(o, told_ns, clock_body);
   addRow(o);
   addProof(o);
   writePatches(o, bodies);  // a seam without an answer has events, too

@@ -28,7 +28,9 @@ class Report {
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
   explicit Report(const std::string& folder);
 
-  void add(const Outcome& outcome, const std::vector<Body>& bodies);
+  /// told_ns: when it was answered, by the clock of the receipts; 0: nobody knows.
+  void add(const Outcome& outcome, const std::vector<Body>& bodies, std::int64_t told_ns = 0,
+           const std::string& clock_body = {});
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
@@ -65,7 +67,7 @@ class Report {
   void addRow(const Outcome& outcome);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
   void addTimes(const Outcome& outcome);
-  void writeStep(const Outcome& outcome);
+  void writeStep(const Outcome& outcome, std::int64_t told_ns, const std::string& clock_body);
   void writeContacts(const Outcome& outcome, const std::vector<Body>& bodies);
   void writePatches(const Outcome& outcome, const std::vector<Body>& bodies);
   nlohmann::json heatJson() const;

@@ -1,0 +1,329 @@
+"""Worlds of the storm: what a seed makes of bodies, frames, maps and faults, as messages in the order in which they come, and parameters."""
+import math
+import random
+import struct
+
+import numpy as np
+import rospy
+from deformable_ccd.msg import MeshStamped
+from geometry_msgs.msg import Point, Pose, PoseArray, TransformStamped
+from octomap_msgs.msg import Octomap
+from sensor_msgs.msg import PointCloud2, PointField
+from shape_msgs.msg import MeshTriangle
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker
+
+NS, START = 10 ** 9, 1000 * 10 ** 9
+FINGER = np.array([[-.03, -.03, -.03], [.03, -.03, -.03], [0, .03, -.03], [0, 0, .03]])
+FINGER_OBJ = ''.join('v %r %r %r\n' % tuple(p) for p in FINGER.tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
+ROBOT = ('<robot name="arm"><link name="tool"><collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link><link name="wrist">'
+         '<collision><origin xyz="0 0 0.1" rpy="0.3 0 0"/><geometry><cylinder radius="0.03" length="0.06"/></geometry></collision></link>'
+         '<joint name="j" type="fixed"><parent link="wrist"/><child link="tool"/></joint></robot>')
+FAULTS = ('damaged', 'lost', 'late', 'twice', 'out of order', 'other stamp', 'elsewhere', 'stops', 'jumps', 'differs', 'other publisher')
+
+
+def stamp(ns):
+    return rospy.Time(ns // NS, ns % NS)
+
+
+def octree(keys):
+    """The bytes of a binary octree that has these finest voxels, of keys."""
+    tree = {}
+    for key in keys:
+        node = tree
+        for level in range(15, -1, -1):
+            node = node.setdefault(sum((k >> level & 1) << i for i, k in enumerate(key)), {})
+    out = []
+
+    def write(node, level):
+        kinds = [0 if i not in node else 2 if level == 0 else 3 for i in range(8)]
+        bits = sum(kind << (2 * i) for i, kind in enumerate(kinds))
+        out.extend((bits & 255, bits >> 8))
+        for i in range(8):
+            if kinds[i] == 3:
+                write(node[i], level - 1)
+    write(tree, 15)
+    return [b - 256 if b > 127 else b for b in out]
+
+
+class Way:
+    """A place over time that goes to and fro, smoothly or in jerks, and an angle about an axis."""
+
+    def __init__(self, r, far, turn, tame):
+        self.middle = np.array([r.uniform(-.05, .05), r.uniform(-.05, .05), r.uniform(-.05, .15)]) * far
+        calm = tame or r.random() < .6
+        self.waves = [(r.uniform(0, .03 if calm else .12) * far * (3 if i == 2 else 1), r.uniform(.3, 1.5 if calm else 9), r.uniform(0, 6.3))
+                      for i in range(3)]
+        self.jerks = [(r.uniform(0, 1.5), r.uniform(.01, .06), r.uniform(-.25, .25) * far) for _ in range(r.choice([0, 0, 1, 3]) * (not tame))]
+        axis = np.array([r.gauss(0, 1) for _ in range(3)])
+        self.axis = axis / np.linalg.norm(axis)
+        self.turn = (r.uniform(0, 2.5) * (.1 if calm else 1), r.uniform(.3, 1 if calm else 5), r.uniform(0, 6.3)) if turn else (0, 1, 0)
+
+    def at(self, t):
+        p = self.middle + [a * math.sin(w * t + f) for a, w, f in self.waves]
+        p[2] += sum(by for when, long, by in self.jerks if when <= t < when + long)
+        a, w, f = self.turn
+        angle = a * math.sin(w * t + f)
+        return p, np.append(self.axis * math.sin(angle / 2), math.cos(angle / 2))
+
+
+class World:
+    """rows: [topic, message, when it comes (ns), publisher]; params: what the monitor is told; faults: which were made."""
+
+    def __init__(self, seed, folder, faults=None):
+        self.r, self.folder, self.rows, self.seed = random.Random(seed), folder, [], seed
+        r = self.r
+        self.tame = seed % 10 == 0
+        self.seconds, self.begin = r.choice([.8, 1.2, 1.6]), START + r.choice([0, 0, 7, 699 * 10 ** 6, 7 * 10 ** 17])
+        self.params = {'fixed_frame': 'world', 'bodies': {}}
+        self.frames()
+        for i in range(1 if self.tame else r.choice([1, 1, 2, 2, 3])):
+            self.stream('body%d' % i, i)
+        if r.random() < .6:
+            self.params['bodies']['finger'] = {'rigid': {'mesh': folder + '/finger.obj', 'frame': self.chain[-1]}}
+        if r.random() < .3:
+            self.stream('plate', 9, static=True)
+        if r.random() < .25:
+            self.robot()
+        if r.random() < .5:
+            self.map()
+        self.options()
+        self.rows.sort(key=lambda row: row[2])
+        self.faults = []
+        if not self.tame:
+            for kind in faults if faults is not None else [r.choice(FAULTS) for _ in range(r.choice([0, 1, 1, 2, 3]))]:
+                self.fault(kind)
+        self.rows.sort(key=lambda row: row[2])
+        for before, row in zip(self.rows, self.rows[1:]):  # no two at once
+            row[2] = max(row[2], before[2] + 1000)
+
+    def ticks(self, hz, before=0.0):
+        r, at = self.r, self.r.uniform(0, 1 / hz) - before
+        while at < self.seconds + before:
+            yield at
+            at += (1 if self.tame else r.uniform(.7, 1.3) if r.random() < .2 else 1) / hz
+
+    def add(self, topic, message, at, delay=0.0):
+        self.rows.append([topic, message, self.begin + int(round((at + delay) * NS)), topic])
+
+    def ns(self, at):
+        return self.begin + int(round(at * NS))
+
+    # -- frames ----------------------------------------------------------------------------------------------------
+
+    def frames(self):
+        """A chain of moving frames from the world on, and one static frame."""
+        r = self.r
+        self.chain, parent = [], 'world'
+        for i in range(1 if self.tame else r.choice([1, 1, 2, 3, 4])):
+            name = 'joint%d' % i
+            self.tf(name, parent, Way(r, .7 if i == 0 else .4, r.random() < .7, self.tame))
+            self.chain.append(name)
+            parent = name
+        self.mount = TransformStamped(child_frame_id='mount')
+        self.mount.header.frame_id = 'world'
+        self.mount.transform.translation.x, self.mount.transform.rotation.w = .02, 1
+        for k in range(1 if self.tame else r.choice([1, 1, 2])):
+            self.add('/tf_static', TFMessage([self.mount]), -.3 if self.tame or k == 0 else r.uniform(0, self.seconds))
+
+    def tf(self, name, parent, way):
+        delay = self.r.uniform(0, .02)
+        for at in self.ticks(self.r.choice([15, 30, 30, 60, 100]), .2):
+            one = TransformStamped(child_frame_id=name)
+            one.header.frame_id, one.header.stamp = parent, stamp(self.ns(at))
+            p, q = way.at(at)
+            t = one.transform
+            (t.translation.x, t.translation.y, t.translation.z), (t.rotation.x, t.rotation.y, t.rotation.z, t.rotation.w) = p, q
+            self.add('/tf', TFMessage([one]), at, delay)
+
+    # -- bodies ----------------------------------------------------------------------------------------------------
+
+    def stream(self, name, number, static=False):
+        r = self.r
+        kind = r.choice(['cloud', 'cloud', 'mesh', 'poses', 'soup'])
+        frame = 'world' if self.tame or r.random() < .6 else r.choice(['mount'] if static else self.chain + ['mount'])
+        settings = {'topic': '/' + name}
+        rows, cols = r.choice([2, 3]), r.choice([2, 3, 4])
+        if kind == 'cloud':
+            settings['topology'] = {'rows': rows, 'cols': cols}
+        way, edge = Way(r, 1, False, self.tame), r.choice([.05, .08, .12])
+        way.middle[2] += .06 * number if number < 9 else -.05
+        flutter = (r.uniform(0, .02), r.uniform(1, 20))
+        rest = [(edge * (i - rows / 2), edge * (j - cols / 2), 0) for i in range(rows) for j in range(cols)]
+        if static:
+            settings['motion'], times = 'static', [-.1] + [r.uniform(0, self.seconds)] * (r.random() < .2)
+        else:
+            times = list(self.ticks(r.choice([10, 10, 15, 20, 30])))
+        delay = r.uniform(0, .03)
+        for at in times:
+            p, _ = way.at(at)
+            points = [(x + p[0], y + p[1], z + p[2] + flutter[0] * math.sin(flutter[1] * at + 30 * x + 17 * y)) for x, y, z in rest]
+            self.add('/' + name, getattr(self, kind)(points, cols, self.ns(at), frame), at, delay)
+        if static or r.random() < .3:
+            settings['against_obstacle'] = False
+        self.params['bodies'][name] = settings
+
+    @staticmethod
+    def cloud(points, cols, ns, frame):
+        message = PointCloud2(height=1, width=len(points), point_step=12, row_step=12 * len(points), is_dense=True)
+        message.header.frame_id, message.header.stamp = frame, stamp(ns)
+        message.fields = [PointField(name=n, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate('xyz')]
+        message.data = b''.join(struct.pack('<3f', *p) for p in points)
+        return message
+
+    @staticmethod
+    def faces(points, cols):
+        for a in range(len(points) - cols):
+            if a % cols < cols - 1:
+                yield a, a + cols, a + 1
+                yield a + 1, a + cols, a + cols + 1
+
+    @classmethod
+    def mesh(cls, points, cols, ns, frame):
+        message = MeshStamped(vertices=[Point(*p) for p in points], triangles=[MeshTriangle(f) for f in cls.faces(points, cols)])
+        message.header.frame_id, message.header.stamp = frame, stamp(ns)
+        return message
+
+    @staticmethod
+    def poses(points, cols, ns, frame):
+        message = PoseArray(poses=[Pose(position=Point(*p)) for p in points[:cols + 1]])
+        message.header.frame_id, message.header.stamp = frame, stamp(ns)
+        return message
+
+    @classmethod
+    def soup(cls, points, cols, ns, frame):
+        message = Marker(type=Marker.TRIANGLE_LIST, points=[Point(*points[v]) for f in cls.faces(points, cols) for v in f])
+        message.header.frame_id, message.header.stamp = frame, stamp(ns)
+        message.pose.orientation.w = message.scale.x = message.scale.y = message.scale.z = 1
+        return message
+
+    def robot(self):
+        r = self.r
+        self.params['robot'] = {'description': self.folder + '/arm.urdf', 'own_voxels_m': 0, 'against_map': r.random() < .5}
+        self.tf('tool', self.chain[0], Way(r, .8, True, self.tame))
+        self.tf('wrist', 'world', Way(r, .8, True, self.tame))
+
+    def map(self):
+        r = self.r
+        self.params['octomap_topic'] = '/map'
+        frame = 'world' if self.tame or r.random() < .7 else r.choice(['mount', self.chain[0]])
+        resolution = r.choice([.02, .05])
+        voxels = {tuple(32768 + r.randrange(-6, 6) if i < 2 else 32768 + r.randrange(-6, 8) for i in range(3)) for _ in range(r.choice([1, 4, 12]))}
+        for k, at in enumerate([0.0] + ([] if self.tame else sorted(r.uniform(0, self.seconds) for _ in range(r.choice([0, 0, 1, 3]))))):
+            if k:
+                voxels = {v for v in voxels if r.random() < .8} | {tuple(32768 + r.randrange(-6, 7) for _ in range(3)) for _ in range(2)}
+            message = Octomap(binary=True, id='OcTree', resolution=resolution, data=octree(voxels))
+            message.header.frame_id, message.header.stamp = frame, stamp(self.ns(at))
+            self.add('/map', message, at, r.choice([0, .03, .15]) if k else 0)
+        if r.random() < .3:
+            self.params['exclude_boxes'] = [[-.1, -.1, r.uniform(-.2, .1), .1, .1, .3]]
+
+    def options(self):
+        r, p = self.r, self.params
+        streams = [n for n, s in p['bodies'].items() if 'rigid' not in s and 'motion' not in s]
+        often = max(streams, key=lambda n: sum(row[0] == '/' + n for row in self.rows))
+        p['clock_body'] = often if self.tame or r.random() < .6 else r.choice(streams)
+        p['sync_timeout_s'] = .1 if r.random() < .2 else .5
+        if r.random() < .3:
+            p.update(accuracy='conservative', minimum_separation_m=r.choice([.002, .01]))
+        if r.random() < .4:
+            p.update(max_speed_m_s=r.choice([1.0, 3.0]), speed_scale={'reaction_time_s': .15, 'stopping_time_s': .3, 'uncertainty_m': .01})
+            p['effects'] = {'clearance': 'on'}
+        if r.random() < .2:
+            names = list(p['bodies'])
+            p['expected_contacts'] = [{'between': [names[0], r.choice(names[1:] + ['self', 'octomap'])]}]
+        if r.random() < .2 and 'topology' in p['bodies'][streams[0]]:
+            p['bodies'][streams[0]]['vertex_mask'] = [0]
+        if r.random() < .5:
+            p['rigid_tolerance_m'] = r.choice([1e-4, 3e-3, 1e-2, 1e-2])
+        if r.random() < .3:
+            p.update(r.choice([{'queue_size': 1}, {'transform_timeout_s': .05}, {'sync_timeout_s': .02}, {'max_step_s': .15},
+                               {'octomap_timeout_s': .4}, {'answer_timeout_s': .1}, {'queue_policy': 'oldest'}]))
+
+    # -- faults ----------------------------------------------------------------------------------------------------
+
+    def fault(self, kind):
+        r = self.r
+        topic = r.choice(sorted({row[0] for row in self.rows}))
+        mine = [row for row in self.rows if row[0] == topic]
+        if topic == '/tf' and kind in ('stops', 'differs', 'jumps'):  # of one joint
+            child = r.choice(mine)[1].transforms[0].child_frame_id
+            mine = [row for row in mine if row[1].transforms[0].child_frame_id == child]
+        row = r.choice(mine)
+        at = mine.index(row)
+        self.faults.append('%s %s at %d' % (topic, kind, at))
+        if kind == 'lost':
+            for gone in mine[at:at + r.choice([1, 1, 3])]:
+                self.rows.remove(gone)
+        elif kind == 'stops':
+            for gone in mine[max(at, len(mine) // 2):]:
+                self.rows.remove(gone)
+        elif kind == 'late':
+            row[2] += r.choice([5, 30, 120, 300]) * 10 ** 6
+        elif kind == 'out of order' and at + 1 < len(mine):
+            row[2], mine[at + 1][2] = mine[at + 1][2], row[2]
+        elif kind in ('twice', 'elsewhere', 'other publisher'):
+            again = [topic, copied(row[1]), row[2] + r.choice([1, 20, 80]) * 10 ** 6, 'another' if kind == 'other publisher' else row[3]]
+            if kind != 'twice':
+                moved(again[1], r.choice([.0005, .01, .1]), r)
+            if kind == 'other publisher':
+                restamped(again[1], r.choice([0, 3, -7, 40]) * 10 ** 6)
+            self.rows.append(again)
+        elif kind == 'other stamp':
+            restamped(row[1], r.choice([-1, 1, -20, 20, -300, 3000]) * 10 ** 6)
+        elif kind == 'differs':
+            by = r.choice([-2, 2, .05, -.05, .4]) * NS
+            for one in mine:
+                restamped(one[1], int(by))
+        elif kind == 'jumps':
+            by = r.choice([-1, -.2, .3, 5]) * NS
+            for one in mine[at:]:
+                restamped(one[1], int(by))
+        elif kind == 'damaged':
+            row[1] = damaged(copied(row[1]), r)
+
+
+def copied(message):
+    import io
+    out = io.BytesIO()
+    message.serialize(out)
+    return type(message)().deserialize(out.getvalue())
+
+
+def headers(message):
+    return [t.header for t in message.transforms] if hasattr(message, 'transforms') else [message.header]
+
+
+def restamped(message, by):
+    for header in headers(message):
+        header.stamp = stamp(max(1, header.stamp.to_nsec() + by))
+
+
+def moved(message, by, r):
+    if isinstance(message, TFMessage):
+        message.transforms[0].transform.translation.z += by
+    elif isinstance(message, PointCloud2):
+        values = np.frombuffer(message.data, '<f4').copy()
+        values[2::3] += by
+        message.data = values.tobytes()
+    elif isinstance(message, Octomap):
+        message.data = octree({tuple(32768 + r.randrange(-6, 7) for _ in range(3)) for _ in range(4)})
+    else:
+        for p in getattr(message, 'vertices', None) or getattr(message, 'points', None) or [x.position for x in message.poses]:
+            p.z += by
+
+
+def damaged(message, r):
+    nan = float('nan')
+    if isinstance(message, TFMessage):
+        setattr(message.transforms[0].transform.rotation, 'w', r.choice([nan, 5.0]))
+    elif isinstance(message, PointCloud2):
+        message.data = message.data[:-5] if r.random() < .5 else struct.pack('<f', nan) + message.data[4:]
+    elif isinstance(message, Octomap):
+        message.data = message.data[:r.randrange(1, 20)]
+    elif isinstance(message, MeshStamped) and r.random() < .5:
+        message.triangles[0].vertex_indices = (0, 1, 999)
+    else:
+        points = getattr(message, 'vertices', None) or getattr(message, 'points', None) or [x.position for x in message.poses]
+        points[0].x = nan if r.random() < .7 else 1e6
+    return message
