@@ -33,6 +33,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   static_frames_.resize(config_.bodies.size());
   came_.resize(config_.bodies.size());
   forgotten_.resize(config_.bodies.size());
+  carried_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {

@@ -202,6 +202,14 @@ class MonitorPipeline {
     StampNs stamp_ns;
     std::uint64_t times_forgotten;  // by tf, when it was placed
   };
+  /// A mesh as it came last, in the frame that carries it, which is another one than the fixed one.
+  struct Carried {
+    std::string frame_id;
+    ClockFrame at;
+    Eigen::Isometry3d pose;
+    Positions positions;
+  };
+  std::vector<std::optional<Carried>> carried_;  // by body
   std::deque<ClockFrame> clock_frames_;  // of the clock body that were placed: the last one, and those steps wait for
   std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
@@ -292,8 +300,11 @@ class MonitorPipeline {
   std::vector<SeenPose> findStatic(const std::string& frame, StampNs stamp_ns) const;
   /// Why tf may be wrong about the place of the body's frame; empty: nothing says so.
   std::string doubtOf(std::size_t body, const DecodedMesh& mesh, std::uint64_t times_forgotten);
+  /// Why the body was elsewhere between this frame, which is not placed yet, and the one before.
+  std::string offWay(std::size_t body, const DecodedMesh& mesh, const Eigen::Isometry3d& fixed_from_mesh,
+                     std::uint64_t times_forgotten);
   std::string doubtAt(const std::string& target, const std::string& source, StampNs stamp_ns) const;
-  /// Between a frame of the clock body and a stamp.
+  /// Between a frame and a stamp.
   std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, const ClockFrame& from,
                                      StampNs to_ns) const;
   std::vector<SeenPose> posesFrom(const std::string& target, const std::string& source, const ClockFrame& from,

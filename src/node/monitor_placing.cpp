@@ -230,6 +230,8 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     return true;
   }
   done.mesh.doubt = doubtOf(body, done.mesh, times_forgotten);
+  const std::string off_way = offWay(body, done.mesh, fixed_from_mesh, times_forgotten);
+  if (done.mesh.doubt.empty()) done.mesh.doubt = off_way;
   if (isStatic(body)) {
     done.mesh.pose = fixed_from_mesh;
     // A camera may move, and what it saw is where it was then.
@@ -297,6 +299,37 @@ std::string MonitorPipeline::doubtOf(std::size_t body, const DecodedMesh& mesh, 
   return doubtAt(fixed_frame_, mesh.frame_id, mesh.stamp_ns);
 }
 
+/// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it. A
+/// step takes them straight in the fixed frame.
+std::string MonitorPipeline::offWay(std::size_t body, const DecodedMesh& mesh, const Eigen::Isometry3d& fixed_from_mesh,
+                                    std::uint64_t times_forgotten) {
+  if (isStatic(body) || mesh.frame_id == fixed_frame_) {
+    carried_[body].reset();
+    return {};
+  }
+  const std::optional<Carried> last = std::exchange(
+      carried_[body], Carried{mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh, mesh.positions});
+  // Of other frames there is no step, or other sentences say why it is not proved.
+  if (!last || last->frame_id != mesh.frame_id || last->positions.size() != mesh.positions.size()) return {};
+  const std::vector<SeenPose> seen = posesBetween(fixed_frame_, mesh.frame_id, last->at, mesh.stamp_ns);
+  double off_m = 0;
+  for (const SeenPose& one : seen) {
+    if (!one.pose.matrix().allFinite()) return one.why_unknown;
+    const double u =
+        static_cast<double>(one.stamp_ns - last->at.stamp_ns) / static_cast<double>(mesh.stamp_ns - last->at.stamp_ns);
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+      const Vec3 &from = last->positions[v], &to = mesh.positions[v];
+      const Vec3 straight = (1 - u) * (last->pose * from) + u * (fixed_from_mesh * to);
+      off_m = std::max(off_m, (one.pose * ((1 - u) * from + u * to) - straight).norm());
+    }
+  }
+  if (off_m <= config_.monitor.detector.rigid_tolerance_m) return {};
+  std::ostringstream text;
+  text << "between two of its frames tf has its frame '" << shortText(mesh.frame_id, MAX_NAME) << "' up to " << off_m
+       << " m off the straight way; send its mesh more often, or in the fixed frame";
+  return text.str();
+}
+
 /// Next to the stamp something of the way is missing.
 std::string MonitorPipeline::doubtAt(const std::string& target, const std::string& source, StampNs stamp_ns) const {
   if (target == source) return {};
@@ -355,7 +388,8 @@ bool MonitorPipeline::mayBeAStep(StampNs from_ns, StampNs to_ns) const {
   return from_ns < to_ns && secondsBetween(from_ns, to_ns) <= config_.monitor.store.max_step_s + 1e-6;
 }
 
-/// Target_from_source at each stamp of tf between the two, as far back as a step may reach.
+/// Target_from_source at each stamp of tf between the two, as far back as a step may reach, and in the middle between
+/// such stamps: joint by joint a chain goes otherwise than from one pose to the other.
 std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, const std::string& source,
                                                     const ClockFrame& from, StampNs to_ns) const {
   std::vector<SeenPose> seen;
@@ -365,14 +399,21 @@ std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, c
     return {unknownAt(to_ns - 1, FORGOTTEN)};
   }
   std::vector<TransformFeed::NewParent> changes;
-  const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from.stamp_ns, to_ns, changes);
+  std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from.stamp_ns, to_ns, changes);
   if (stamps.size() > tolerance::MOST_POSES_A_STEP) {
     return {unknownAt(stamps.back(), "more than " + std::to_string(tolerance::MOST_POSES_A_STEP) + " transforms")};
   }
+  StampNs before_ns = from.stamp_ns;
+  stamps.push_back(to_ns);
   std::string unused;
-  for (const StampNs stamp_ns : stamps) {
+  const auto look = [&](StampNs stamp_ns) {
     SeenPose one{stamp_ns, {}};
     if (transforms_.lookup(target, source, stamp_ns, one.pose, unused)) seen.push_back(one);
+  };
+  for (const StampNs stamp_ns : stamps) {
+    if (stamp_ns - before_ns > 1) look(before_ns + (stamp_ns - before_ns) / 2);
+    if (stamp_ns < to_ns) look(stamp_ns);
+    before_ns = stamp_ns;
   }
   std::transform(changes.begin(), changes.end(), std::back_inserter(seen), unknownBefore);
   const auto isBefore = [](const SeenPose& a, const SeenPose& b) { return a.stamp_ns < b.stamp_ns; };

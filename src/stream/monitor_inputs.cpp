@@ -165,8 +165,7 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   std::ostringstream text;
   text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in ";
   if (body.rigid) {
-    text << seen.size() << " transforms between its ends; send the mesh of '" << bodies[options.clock_body].name
-         << "' more often";
+    text << "poses of tf between its ends; send the mesh of '" << bodies[options.clock_body].name << "' more often";
   } else {
     text << frames.size() << " frames between its ends; make it the clock_body";
   }

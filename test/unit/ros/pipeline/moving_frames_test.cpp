@@ -61,7 +61,7 @@ TEST(RigidBodies, ThatLeaveTheirPathBetweenTheEndsAreNoClearStep) {
     EXPECT_TRUE(outcome.answered);
     EXPECT_FALSE(assuranceOf(outcome).proved);
     EXPECT_NE(outcome.reason.find("body 'tip' was seen up to"), std::string::npos) << outcome.reason;
-    EXPECT_NE(outcome.reason.find("transforms between its ends"), std::string::npos) << outcome.reason;
+    EXPECT_NE(outcome.reason.find("poses of tf between its ends"), std::string::npos) << outcome.reason;
   }
   EXPECT_TRUE(assuranceOf(lastOf({0.5, 0.4995, 0.5005})).clear()) << "within rigid_tolerance_m of 1 mm";
 }
