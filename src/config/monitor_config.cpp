@@ -259,11 +259,12 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 }  // namespace
 
 void refuseGone(ParameterReader& reader, const std::string& section) {
+  const std::vector<std::string> given = reader.names();  // has() would have them suggested for others
   for (const auto& [name, instead] : GONE) {
     const std::string path = name;
     if (path.compare(0, section.size(), section) != 0) continue;
     const std::string own = path.substr(section.size());
-    if (own.find('/') == std::string::npos && reader.has(own)) reader.fail(own, std::string("is gone: ") + instead);
+    if (std::find(given.begin(), given.end(), own) != given.end()) reader.fail(own, std::string("is gone: ") + instead);
   }
 }
 

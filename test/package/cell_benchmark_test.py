@@ -22,7 +22,7 @@ def run_of(*contacts, clear_from=0):
     for i in range(10):
         found = [Contact(t, (x, 0, 0), patch, 0.2, int(patch >= 100)) for t, x, patch in contacts if i <= 10 * t < i + 1]
         steps.append(Step(0.1 * i, 0.1 * (i + 1), not found and i >= clear_from, found))
-    return Run(steps, {patch for _, _, patch in contacts}, [])
+    return Run(steps, {patch for _, _, patch in contacts}, [], 100)
 
 
 @unittest.skipUnless(HAS_NUMPY, 'numpy, which comes with what scripts/setup --benchmark installs, is not there')
@@ -93,8 +93,8 @@ class JudgeTest(FolderTestCase):
         self.assertLessEqual({(0, 0, 0), (1, 0, 0), (55, 0, 0)}, voxels)
         self.assertTrue(voxels.isdisjoint({(2, 0, 0), (-1, 0, 0), (50, 0, 0)}))
         own = [(0.01, 0.01, 0.01), (0.03, 0.01, 0.01), (0.05, 0.01, 0.01), (1.01, 0.01, 0.01), (1.11, 0.01, 0.01)]
-        self.assertEqual(blind_percent(Run([], set(), own), voxels, RESOLUTION_M), 60)
-        self.assertIsNone(blind_percent(Run([], set(), []), voxels, RESOLUTION_M))
+        self.assertEqual(blind_percent(Run([], set(), own, 100), voxels, RESOLUTION_M), 60)
+        self.assertIsNone(blind_percent(Run([], set(), [], 100), voxels, RESOLUTION_M))
 
     def test_every_scene_can_be_recorded_with_its_camera(self):
         for scene in CELLS:
