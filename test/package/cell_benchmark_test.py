@@ -74,7 +74,7 @@ class JudgeTest(FolderTestCase):
 
     def test_what_is_no_alarm_finds_nothing(self):
         run = run_of(*self.TRUTH)
-        row = judge(run, Run(run.steps, set(), []), set(), RESOLUTION_M)
+        row = judge(run, Run(run.steps, set(), [], 100), set(), RESOLUTION_M)
         self.expect(row, true=0, false=0, missed=2, in_time=0, clear=7)
 
     def test_clear_is_asked_for_where_the_truth_is_clear(self):
