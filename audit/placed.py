@@ -190,6 +190,10 @@ class Track:
         """May the monitor take another path for its, within rigid_tolerance_m?"""
         return bool(self.knots(start, end)) or self.turns(start, end)
 
+    def loose_at_end(self, start, end):
+        """The same of the place at the end."""
+        return False
+
 
 def halves(stamps):
     """With those in the middle: joints that turn against each other are elsewhere there."""
@@ -271,6 +275,9 @@ class Stream(Track):
         """Are the positions at the step's ends the doubles of the messages, and the way straight?"""
         frames = self.around(start, end)
         return frames[0].stamp == start and frames[-1].stamp == end and len(frames) == 2 and frames[0].frame == self.fixed
+
+    def loose_at_end(self, start, end):
+        return self.around(start, end)[-1].stamp != end and self.turns(start, end)
 
     def carrier(self, start, end):
         return self.around(start, end)[0].frame

@@ -239,6 +239,8 @@ class World:
         if r.random() < .3:
             p.update(r.choice([{'queue_size': 1}, {'transform_timeout_s': .05}, {'sync_timeout_s': .02}, {'max_step_s': .15},
                                {'octomap_timeout_s': .4}, {'answer_timeout_s': .1}, {'queue_policy': 'oldest'}]))
+            if self.tame:  # its map comes once
+                p.pop('octomap_timeout_s', None)
 
     # -- faults ----------------------------------------------------------------------------------------------------
 
