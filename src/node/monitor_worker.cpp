@@ -198,7 +198,7 @@ void CollisionMonitor::Impl::publishVoided() {
   const std::string why = pipeline.takeVoided();
   if (why.empty()) return;
   state.takeBack(why + "; no step has been answered since");
-  publishNoPromise();
+  if (pipeline.promises().isRevoked()) publishNoPromise();  // else none was made that could be taken back
 }
 
 void CollisionMonitor::Impl::publishNoPromise() {

@@ -67,8 +67,15 @@ class AnalyzeBagTestCase(FolderTestCase):
         steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
         return collections.Counter(row[steps[0].index('status')] for row in steps[1:])
 
+    @staticmethod
+    def rows_of(path):
+        """Without the columns that say when something came, and when it was told."""
+        rows = [line.split(',') for line in path.read_text().splitlines()]
+        kept = [i for i, name in enumerate(rows[0]) if name not in ('told_ns', 'map_stamp_ns', 'map_came_ns')]
+        return [[row[i] for i in kept if i < len(row)] for row in rows]
+
     def expect_same(self, report, names=('contacts.csv', 'steps.csv')):
         for name in names:
-            expected = (self.plain / name).read_bytes()
-            self.assertGreater(expected.count(b'\n'), 20, 'too little to mean anything')
-            self.assertEqual((report / name).read_bytes(), expected, name)
+            expected = self.rows_of(self.plain / name)
+            self.assertGreater(len(expected), 20, 'too little to mean anything')
+            self.assertEqual(self.rows_of(report / name), expected, name)
