@@ -204,7 +204,7 @@ class ClearTest(AttackTest):
             wait_for(lambda: len(self.contacts) >= seen + 9, 20, 'nine of the twelve')
             after = next(s for s in self.states[said:] if s.holds_until > burst[2])
             if policy == 'newest':
-                self.assert_unknown(self.contacts[seen + 1], after, 'cloth', 'not used: QUEUE_FULL')
+                self.assert_unknown(self.contacts[seen + 1], after, 'cloth', 'QUEUE_FULL')
             else:
                 self.assertTrue(after.clear, after.reason)
                 self.assertIn("3 frames of body 'cloth' by queue_policy: thin", after.excluded)
