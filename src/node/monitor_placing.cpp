@@ -29,6 +29,8 @@ std::string secondsOf(StampNs stamp_ns) {
   return text.str();
 }
 
+constexpr double STILL = 1e-12;  // of a pose's numbers: what interpolating between two equal ones may round
+
 const char* const FORGOTTEN = "stamps of tf went back, or a static transform is another one";
 
 std::string noTransformAt(StampNs stamp_ns) { return "no transform of its frame at " + secondsOf(stamp_ns); }
@@ -315,6 +317,8 @@ std::string MonitorPipeline::offWay(std::size_t body, const DecodedMesh& mesh, c
   double off_m = 0;
   for (const SeenPose& one : seen) {
     if (!one.pose.matrix().allFinite()) return one.why_unknown;
+    // A frame that stands still, as a camera's on its mount, costs no look at the vertices.
+    if (one.pose.isApprox(fixed_from_mesh, STILL) && last->pose.isApprox(fixed_from_mesh, STILL)) continue;
     const double u =
         static_cast<double>(one.stamp_ns - last->at.stamp_ns) / static_cast<double>(mesh.stamp_ns - last->at.stamp_ns);
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {

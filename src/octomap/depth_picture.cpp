@@ -9,8 +9,8 @@ namespace {
 
 constexpr float NOWHERE = std::numeric_limits<float>::infinity();
 constexpr double SQRT2 = 1.4142135623730951, SQRT3 = 1.7320508075688772;
-// Of a coordinate, of a depth as a float, and of a pixel: more than what the numbers cannot tell.
-constexpr double ROUNDING = 1e-9, DEPTH_ROUNDING = 1e-6, ROUNDING_PX = 1e-3;
+// Of a depth as a float, and of a pixel: more than what the numbers cannot tell.
+constexpr double DEPTH_ROUNDING = 1e-6, ROUNDING_PX = 1e-3;
 // Rays that nearly cross a voxel: if none of so many does, it stays. Beside the sensor all of them nearly do.
 constexpr int MOST_TRIED = 64;
 
