@@ -311,7 +311,7 @@ std::string MonitorPipeline::offWay(std::size_t body, const DecodedMesh& mesh, c
   }
   const std::optional<Carried> last = std::exchange(
       carried_[body], Carried{mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh, mesh.positions});
-  // With another number of vertices there is no step. Where the frame is another one now, nobody says which way it went.
+  // With another number of vertices there is no step. Where the frame is another one now, nobody says how it went.
   if (!last || last->frame_id != mesh.frame_id || last->positions.size() != mesh.positions.size()) return {};
   const std::vector<SeenPose> seen = posesBetween(fixed_frame_, mesh.frame_id, last->at, mesh.stamp_ns);
   double off_m = 0;
