@@ -17,11 +17,37 @@
 
 namespace dccd {
 
-/// Where something rigid was seen to be, in the fixed frame.
-struct SeenPose {
+/// Where one frame of reference is in another one, at a stamp.
+struct Knot {
   StampNs stamp_ns = 0;
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< not finite: nobody knows
-  std::string why_unknown = {};                            ///< in words
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::string why_unknown = {};  ///< in words; empty: it is known
+};
+
+/// What is said of a frame of reference at stamps at which nobody says where it is.
+enum class Silence : std::uint8_t {
+  UNKNOWN = 0,
+  STANDS = 1,  ///< it is where it was sent last
+};
+
+/// The frame of reference in which something came, by which it was placed in the fixed one.
+struct Carrier {
+  std::string frame;        ///< empty: the fixed frame itself
+  std::uint64_t epoch = 0;  ///< FrameTracks::epoch() when it was placed
+  Silence silence = Silence::UNKNOWN;
+};
+
+/// Where frames of reference go. An empty name is the fixed frame's.
+class DCCD_EXPORT FrameTracks {
+ public:
+  virtual ~FrameTracks() = default;
+  /// The track of target_from_source from one stamp to another, both included: a knot at either, one wherever it may
+  /// bend, and one between any two of these, ascending. A knot says so where nobody knows. None at all: both are the
+  /// same frame.
+  virtual std::vector<Knot> between(const std::string& target, const std::string& source, StampNs from_ns,
+                                    StampNs to_ns, Silence silence) const = 0;
+  /// Another one once what was said before of where frames were may not hold any more.
+  virtual std::uint64_t epoch() const = 0;
 };
 
 /// One frame, already in the fixed frame.
@@ -30,13 +56,13 @@ struct MeshFrame {
   std::shared_ptr<const Topology> topology;
   Positions positions;  ///< [m]; non-finite ones are unchecked, not refused
   /// Rigid bodies: fixed_from_body at the stamp. Between two frames they then move along the rotation, not the chord.
-  /// Static ones: where their frame of reference was.
+  /// Others: fixed_from_carrier.
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
   std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
   std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
-  std::vector<SeenPose> seen = {};    ///< of a rigid body: fixed_from_body since the frame before, ascending
+  Carrier carrier = {};
   /// In the order in which its body's frames came, whatever became of them: between two without a gap none is missing.
   /// 0: it is the one after the last.
   std::uint64_t number = 0;
@@ -109,9 +135,6 @@ class DCCD_EXPORT MeshStore {
   std::string unknownWithin(StampNs from_ns, StampNs to_ns) const;
   /// How many were left out by choice between the same frames.
   std::uint64_t thinnedWithin(StampNs from_ns, StampNs to_ns) const;
-
-  /// The poses seen between two stamps, neither included.
-  std::vector<SeenPose> seenWithin(StampNs from_ns, StampNs to_ns) const;
 
   /// Forgets what is not needed for stamps at or after this one.
   void forgetBefore(StampNs stamp_ns);

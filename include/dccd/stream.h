@@ -86,10 +86,10 @@ class DCCD_EXPORT Monitor {
 
   /// From the next step on the body is another one, with frames of its own: those that it had are forgotten. `body` may
   /// be bodies().size(), which adds one. All that is known of the other bodies stays. Push what steps to come begin
-  /// with, from nextStart() on, or the next step waits for it. Throws std::invalid_argument; all then stays.
+  /// with, at stampsToCome(), or the next step waits for it. Throws std::invalid_argument; all then stays.
   void setBody(std::size_t body, Body what);
-  /// Where the next step begins: the oldest one that waits, or that of the clock body's next frame. 0: not known yet.
-  StampNs nextStart() const;
+  /// Where steps to come begin and end, as far as that is known, ascending.
+  std::vector<StampNs> stampsToCome() const;
 
   /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
   /// again.
@@ -103,13 +103,12 @@ class DCCD_EXPORT Monitor {
   void setMapBeside(ObstacleMap map);
   const ObstacleMap& map() const;       ///< as it was given last
   const ObstacleMap& mapInUse() const;  ///< of the last step, and of the next one where none waits
-  /// Frames of the maps that steps to come may have: of the one in use, and of those that wait.
-  std::set<std::string> mapFrames() const;
-  /// Where the frame of what holds at all times was, up to the stamps of the steps to come: of a static body
-  /// (fixed_from_frame, as MeshFrame::pose) or of maps (map_from_fixed). A step in which it is not where push() or
-  /// setMap() had it is PARTIAL.
-  void seen(std::size_t body, const std::vector<SeenPose>& poses);
-  void mapSeen(const std::string& frame, const std::vector<SeenPose>& poses);
+  /// Where the frames go by which frames and maps were placed: asked when a step is answered, of each that is not the
+  /// fixed one. A step in which one is not known, or off by more than rigid_tolerance_m from where the step has what it
+  /// carries, is PARTIAL. Must outlive the monitor. Null, the beginning: what is pushed is all that is known.
+  void setTracks(const FrameTracks* tracks);
+  /// Of such frames those of which a step needs to know: of the map in use, of maps that wait, of static bodies.
+  std::set<std::string> heldFrames() const;
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
   bool next(std::int64_t now_ns, Outcome& outcome);

@@ -90,7 +90,7 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     if (map.missed.empty()) map.missed = std::exchange(missed, {});
     const std::string frame = map.frame_id;
     const bool is_placed = map.surface != nullptr;
-    if (const std::string doubt = is_placed ? doubtAt(frame, fixed_frame_, map.stamp_ns) : ""; !doubt.empty()) {
+    if (const std::string doubt = is_placed ? tracks_.doubtAt(frame, fixed_frame_, map.stamp_ns) : ""; !doubt.empty()) {
       doubted_map_ns_ = loaded.arrival_ns;
       map_doubt_ = doubt;
     }
@@ -99,7 +99,6 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     placed_map_.reset();
     if (!is_placed) continue;
     map_placed_ns_ = now_ns;
-    monitor_->mapSeen(frame, lookBack(frame, fixed_frame_));
     if (config_.fixed_frame.empty()) placed_map_ = std::move(loaded);
   }
   if (unplaced_maps_.empty() || !may_place || !monitor_->map().problem.empty()) return;

@@ -22,6 +22,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   config_.monitor.detector.expected = config_.expectedIn(config_.phase);
   excluded_ = config_.monitor.detector.excluded;
   monitor_ = std::make_unique<Monitor>(config_.monitor, config_.monitorBodies());
+  monitor_->setTracks(&tracks_);
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
   placed_.resize(config_.bodies.size());
@@ -30,10 +31,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
   passed_over_.resize(config_.bodies.size());
-  static_frames_.resize(config_.bodies.size());
   came_.resize(config_.bodies.size());
-  forgotten_.resize(config_.bodies.size());
-  carried_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {

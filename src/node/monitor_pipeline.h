@@ -17,7 +17,7 @@
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
-#include "input/transforms.h"
+#include "input/transform_tracks.h"
 #include "node/attach_request.h"
 #include "node/effects.h"
 #include "output/output_messages.h"
@@ -163,6 +163,8 @@ class MonitorPipeline {
   MonitorConfig config_;
   EffectTracker effects_;
   const TransformFeed& transforms_;
+  std::string fixed_frame_;
+  TransformTracks tracks_{transforms_, fixed_frame_};
   std::unique_ptr<Monitor> monitor_;
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
@@ -170,11 +172,9 @@ class MonitorPipeline {
   PromiseWatch promises_;
   std::string voided_;
   Statement statement_;
-  std::vector<StampNs> widened_ns_;                      // per body, its last frame that widen() has seen; 0: none
-  std::vector<bool> placed_;                             // a static body of which the monitor has a frame
-  std::vector<std::string> static_frames_;               // of such a body, which it is held to; empty: to none
-  std::vector<std::uint64_t> came_;                      // per body, the number of its last message
-  std::vector<std::optional<std::uint64_t>> forgotten_;  // by tf, when the body's last frame was placed
+  std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
+  std::vector<bool> placed_;         // a static body of which the monitor has a frame
+  std::vector<std::uint64_t> came_;  // per body, the number of its last message
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
   std::vector<std::optional<Rigid>> rigid_;
   std::vector<std::optional<Attached>> attached_;
@@ -198,20 +198,6 @@ class MonitorPipeline {
   std::string map_slow_;              // LoadedMap::slow of the newest one
   std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
   std::string map_doubt_;
-  struct ClockFrame {
-    StampNs stamp_ns;
-    std::uint64_t times_forgotten;  // by tf, when it was placed
-  };
-  /// A mesh as it came last, in the frame that carries it, which is another one than the fixed one.
-  struct Carried {
-    std::string frame_id;
-    ClockFrame at;
-    Eigen::Isometry3d pose;
-    Positions positions;
-  };
-  std::vector<std::optional<Carried>> carried_;  // by body
-  std::deque<ClockFrame> clock_frames_;  // of the clock body that were placed: the last one, and those steps wait for
-  std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;
   std::optional<LoadedMap> placed_map_;
@@ -271,10 +257,10 @@ class MonitorPipeline {
   bool placeFrame(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one. Once it is
   /// overdue, links of a robot that have no transform stand in nobody's way any longer.
-  bool placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
-  /// Where it is at the stamp, and was since a frame of the clock body (null: nobody asks). False: nobody knows.
-  bool placeOne(const Rigid& rigid, const ClockFrame* since, StampNs stamp_ns, MeshFrame& frame,
-                std::string& reason) const;
+  bool placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
+  /// Where it is at the stamp. False: nobody knows. epoch: of tracks_, as it was before.
+  bool placeOne(const Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame, std::string& reason) const;
+  Carrier carrierOf(const std::string& frame, std::uint64_t epoch) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
   /// A body is another one from the next step on.
   void setBody(std::size_t body, const Body& what, Rigid rigid);
@@ -288,31 +274,8 @@ class MonitorPipeline {
   void limitUnplacedMaps();
   /// Says of a step with a map that one which came up to then has no place yet.
   void nameNewerMap(std::int64_t came_ns, Outcome& outcome) const;
-  /// Poses that were seen, of static bodies by number, and of maps by their frames.
-  struct SeenPoses {
-    std::map<std::size_t, std::vector<SeenPose>> bodies;
-    std::map<std::string, std::vector<SeenPose>> maps;
-  };
-  /// Where the frames were of what is held, maps and static bodies, since the clock body's last frame, up to the
-  /// stamp of the one that waits. False: it is not known of all.
-  bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
-  std::vector<SeenPose> lookBack(const std::string& target, const std::string& source) const;
-  std::vector<SeenPose> findStatic(const std::string& frame, StampNs stamp_ns) const;
-  /// Why tf may be wrong about the place of the body's frame; empty: nothing says so.
-  std::string doubtOf(std::size_t body, const DecodedMesh& mesh, std::uint64_t times_forgotten);
-  /// Why the body was elsewhere between this frame, which is not placed yet, and the one before.
-  std::string offWay(std::size_t body, const DecodedMesh& mesh, const Eigen::Isometry3d& fixed_from_mesh,
-                     std::uint64_t times_forgotten);
-  std::string doubtAt(const std::string& target, const std::string& source, StampNs stamp_ns) const;
-  /// Between a frame and a stamp.
-  std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, const ClockFrame& from,
-                                     StampNs to_ns) const;
-  std::vector<SeenPose> posesFrom(const std::string& target, const std::string& source, const ClockFrame& from,
-                                  StampNs to_ns) const;
-  bool mayBeAStep(StampNs from_ns, StampNs to_ns) const;
-  void keepClockFrame(const ClockFrame& frame);
-  /// Of the clock body's last frame that was placed; 0: none.
-  StampNs clockNs() const { return clock_frames_.empty() ? 0 : clock_frames_.back().stamp_ns; }
+  /// Tf has the frames at the stamp to which maps and static bodies are held.
+  bool knowsHeld(StampNs stamp_ns) const;
   /// A map came before a frame of that arrival and has no place yet, but may find one soon.
   bool mapMayCome(std::int64_t arrival_ns, std::int64_t now_ns) const;
 };

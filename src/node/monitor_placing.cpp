@@ -1,78 +1,36 @@
 // Where bodies are: frames and rigid bodies wait for their transforms and are moved into the fixed frame, which may be
 // learnt, and learnt anew.
 #include <algorithm>
-#include <cmath>
-#include <iomanip>
-#include <iterator>
 #include <limits>
 #include <optional>
-#include <sstream>
 #include <utility>
 
-#include "input/short_text.h"
-#include "input/transforms.h"
+#include "input/transform_tracks.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
 
-namespace {
-
-SeenPose unknownAt(StampNs stamp_ns, std::string why) {
-  SeenPose seen{stamp_ns, Eigen::Isometry3d::Identity(), std::move(why)};
-  seen.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
-  return seen;
+Carrier MonitorPipeline::carrierOf(const std::string& frame, std::uint64_t epoch) const {
+  return {frame == fixed_frame_ ? std::string() : frame, epoch};
 }
 
-std::string secondsOf(StampNs stamp_ns) {
-  std::ostringstream text;
-  text << stamp_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << stamp_ns % 1'000'000'000 << " s";
-  return text.str();
-}
-
-constexpr double STILL = 1e-12;  // of a pose's numbers: what interpolating between two equal ones may round
-
-const char* const FORGOTTEN = "stamps of tf went back, or a static transform is another one";
-
-std::string noTransformAt(StampNs stamp_ns) { return "no transform of its frame at " + secondsOf(stamp_ns); }
-
-/// How tf has it before the change is as good as unknown: what carried the frame until then may have gone anywhere
-/// after it was last sent.
-SeenPose unknownBefore(const TransformFeed::NewParent& change) {
-  const std::string name = "'" + shortText(*change.frame, MAX_NAME) + "'";
-  if (!change.now) {
-    return unknownAt(change.stamp_ns - 1, "a transform of frame " + name +
-                                              " came that cannot be used, or that has it elsewhere at a stamp that it "
-                                              "had already");
-  }
-  if (!change.before) {
-    return unknownAt(change.stamp_ns - 1,
-                     "tf keeps nothing of frame " + name + " before " + secondsOf(change.stamp_ns));
-  }
-  return unknownAt(change.stamp_ns - 1, "frame " + name + " changed its parent from '" +
-                                            shortText(*change.before, MAX_NAME) + "' to '" +
-                                            shortText(*change.now, MAX_NAME) + "' at " + secondsOf(change.stamp_ns));
-}
-
-}  // namespace
-
-bool MonitorPipeline::placeOne(const Rigid& rigid, const ClockFrame* since, StampNs stamp_ns, MeshFrame& frame,
+bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame,
                                std::string& reason) const {
   frame = rigid.mesh;
   frame.stamp_ns = stamp_ns;
   if (rigid.isNone()) return true;
+  frame.carrier = carrierOf(rigid.frame, epoch);
   if (!transforms_.lookup(fixed_frame_, rigid.frame, stamp_ns, frame.pose, reason)) {
     // It stays where it was, and all of it is unknown there: unchecked.
     frame.pose = rigid.pose.value_or(Eigen::Isometry3d::Identity());
     frame.positions.assign(rigid.reference.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-    frame.seen.assign(1, unknownAt(stamp_ns - 1, noTransformAt(stamp_ns)));
+    frame.doubt = noTransformAt(stamp_ns);
     reason = transforms_.noTransform(rigid.frame, "'" + fixed_frame_ + "'", reason) + "; body '" + rigid.name +
              "' is carried by it";
     return false;
   }
   frame.pose = frame.pose * rigid.frame_from_mesh;
   frame.positions = transformed(frame.pose, rigid.reference);
-  if (since) frame.seen = posesBetween(fixed_frame_, rigid.frame, *since, stamp_ns);
-  for (SeenPose& seen : frame.seen) seen.pose = seen.pose * rigid.frame_from_mesh;
   return true;
 }
 
@@ -80,8 +38,7 @@ bool MonitorPipeline::placeOne(const Rigid& rigid, const ClockFrame* since, Stam
 void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns) {
   Rigid& rigid = *rigid_[body];
   if (lost.empty()) {
-    // It was lost at the start of the step that ends here.
-    if (rigid.lost) frame.seen.push_back(unknownAt(frame.stamp_ns - 1, "no transform of its frame where it begins"));
+    if (rigid.lost) frame.doubt = "no transform of its frame where the step begins";
     rigid.pose = frame.pose;
   } else if (!rigid.lost && body < problems_.size()) {
     problems_[body] = "not watched meanwhile: " + lost;
@@ -91,7 +48,8 @@ void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::st
   monitor_->push(body, std::move(frame), now_ns);
 }
 
-bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason) {
+bool MonitorPipeline::placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool overdue, StepStatus& problem,
+                                  std::string& reason) {
   if (const std::size_t body = misplaced(); body < waiting_.size()) {
     problem = StepStatus::NO_BODY;
     reason = missing(body);
@@ -108,7 +66,7 @@ bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus&
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
     Placed& one = all.emplace_back(Placed{b, {}, {}});
-    if (!placeOne(*rigid_[b], clock_frames_.empty() ? nullptr : &clock_frames_.back(), stamp_ns, one.frame, reason)) {
+    if (!placeOne(*rigid_[b], stamp_ns, epoch, one.frame, reason)) {
       if (!overdue || !rigid_[b]->may_be_lost) return false;
       one.lost = reason;
     }
@@ -122,16 +80,12 @@ void MonitorPipeline::setBody(std::size_t body, const Body& what, Rigid rigid) {
   effects_.setBody(body, what);
   rigid_.resize(std::max(rigid_.size(), body + 1));
   rigid_[body] = std::move(rigid);
-  // Where steps to come begin, so that the next one is answered with it.
-  const StampNs start_ns = monitor_->nextStart();
-  const ClockFrame* before = nullptr;
-  for (const ClockFrame& at : clock_frames_) {
-    if (start_ns == 0 || at.stamp_ns < start_ns) continue;
+  // So that the next one is answered with it.
+  for (const StampNs stamp_ns : monitor_->stampsToCome()) {
     MeshFrame frame;
     std::string reason;
-    const bool placed = placeOne(*rigid_[body], before, at.stamp_ns, frame, reason);
+    const bool placed = placeOne(*rigid_[body], stamp_ns, tracks_.epoch(), frame, reason);
     pushRigid(body, std::move(frame), placed ? "" : reason, 0);
-    before = &at;
   }
 }
 
@@ -197,7 +151,7 @@ void MonitorPipeline::widen(std::size_t body, MeshFrame& frame) {
 
 bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
-  const std::uint64_t times_forgotten = transforms_.timesForgotten();
+  const std::uint64_t epoch = tracks_.epoch();  // before tf is asked: what is forgotten since is told from it
   const bool overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   StepStatus problem = StepStatus::NO_TRANSFORM;
@@ -205,13 +159,12 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   const bool is_clock = body == config_.monitor.clock_body;
   const bool has_place = !fixed_frame_.empty() && transforms_.lookup(fixed_frame_, waiting.mesh.frame_id,
                                                                      waiting.mesh.stamp_ns, fixed_from_mesh, reason);
-  SeenPoses held;
   if (is_clock && has_place) {
     if (mapMayCome(waiting.mesh.arrival_ns, now_ns)) return false;
     // In time for a step that says so, if it does not come.
-    if (!findHeld(waiting.mesh.stamp_ns, held) && !overdue) return false;
+    if (!overdue && !knowsHeld(waiting.mesh.stamp_ns)) return false;
   }
-  const bool placed = has_place && (!is_clock || placeOthers(now_ns, overdue, problem, reason));
+  const bool placed = has_place && (!is_clock || placeOthers(epoch, now_ns, overdue, problem, reason));
   if (!placed) {
     if (!has_place) reason = transforms_.noTransform(waiting.mesh.frame_id, "'" + fixed_frame_ + "'", reason);
     waiting.reason = reason;
@@ -231,198 +184,31 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     skip(body, problem, done.mesh.stamp_ns, done.mesh.arrival_ns, reason);
     return true;
   }
-  done.mesh.doubt = doubtOf(body, done.mesh, times_forgotten);
-  const std::string off_way = offWay(body, done.mesh, fixed_from_mesh, times_forgotten);
-  if (done.mesh.doubt.empty()) done.mesh.doubt = off_way;
+  done.mesh.pose = fixed_from_mesh;
+  done.mesh.carrier = carrierOf(done.mesh.frame_id, epoch);
   if (isStatic(body)) {
-    done.mesh.pose = fixed_from_mesh;
-    // A camera may move, and what it saw is where it was then.
+    done.mesh.doubt = tracks_.doubtAt(fixed_frame_, done.mesh.frame_id, done.mesh.stamp_ns);
+    // A fixed frame that was learnt may be a camera's that moves. In one that was named a static body may be of a frame
+    // that was sent once: what is not sent is not elsewhere. A camera may move, and what it saw is where it was then.
+    if (!config_.fixed_frame.empty()) done.mesh.carrier.silence = Silence::STANDS;
     const bool is_sensors = config_.bodies[body].input.source == TopologySource::DEPTH_IMAGE;
-    static_frames_[body] = is_sensors && !config_.fixed_frame.empty() ? "" : done.mesh.frame_id;
-    if (config_.fixed_frame.empty()) {
-      static_meshes_[body] = done.mesh;
-      monitor_->seen(body, lookBack(fixed_frame_, done.mesh.frame_id));
-    }
+    if (is_sensors && !config_.fixed_frame.empty()) done.mesh.carrier.frame.clear();
+    if (config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
   }
   transform(fixed_from_mesh, done.mesh.positions);
-  if (is_clock) {
-    keepClockFrame({done.mesh.stamp_ns, times_forgotten});
-    for (const auto& [number, poses] : held.bodies) monitor_->seen(number, poses);
-    for (const auto& [frame, poses] : held.maps) monitor_->mapSeen(frame, poses);
-  }
   widen(body, done.mesh);
   monitor_->push(body, std::move(done.mesh), now_ns);
   placed_[body] = isStatic(body);
   return true;
 }
 
-bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
-  bool all_known = true;
-  const auto find = [&](const std::string& target, const std::string& source) {
-    std::vector<SeenPose> seen;
-    if (!clock_frames_.empty()) seen = posesFrom(target, source, clock_frames_.back(), stamp_ns);
-    std::string unused;
-    SeenPose last{stamp_ns, {}};
-    const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
-    seen.push_back(known ? last : unknownAt(stamp_ns, noTransformAt(stamp_ns)));
-    all_known = all_known && known;
-    return seen;
-  };
-  for (const std::string& frame : monitor_->mapFrames()) {
-    if (frame != fixed_frame_) held.maps[frame] = find(frame, fixed_frame_);
-  }
-  // A fixed frame that was learnt may be a camera's that moves. In one that was named a static body may be of a frame
-  // that was sent once: what is not sent is not elsewhere.
-  for (std::size_t b = 0; b < placed_.size(); ++b) {
-    const std::string& frame = static_frames_[b];
-    if (!placed_[b] || frame.empty() || frame == fixed_frame_) continue;
-    held.bodies[b] = config_.fixed_frame.empty() ? find(fixed_frame_, frame) : findStatic(frame, stamp_ns);
-  }
-  return all_known;
-}
-
-/// As far as tf says where it is.
-std::vector<SeenPose> MonitorPipeline::findStatic(const std::string& frame, StampNs stamp_ns) const {
-  std::vector<SeenPose> seen;
-  if (!clock_frames_.empty()) seen = posesBetween(fixed_frame_, frame, clock_frames_.back(), stamp_ns);
-  std::string unused;
-  SeenPose last{stamp_ns, {}};
-  const bool known = transforms_.lookup(fixed_frame_, frame, stamp_ns, last.pose, unused) ||
-                     transforms_.lookup(fixed_frame_, frame, 0, last.pose, unused);  // the newest
-  if (known) seen.push_back(last);
-  return seen;
-}
-
-std::string MonitorPipeline::doubtOf(std::size_t body, const DecodedMesh& mesh, std::uint64_t times_forgotten) {
-  const std::uint64_t before = std::exchange(forgotten_[body], times_forgotten).value_or(times_forgotten);
-  if (mesh.frame_id == fixed_frame_) return {};
-  // Where the frame before was, tf may say otherwise by now.
-  if (!isStatic(body) && before != times_forgotten) return FORGOTTEN;
-  return doubtAt(fixed_frame_, mesh.frame_id, mesh.stamp_ns);
-}
-
-/// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it. A
-/// step takes them straight in the fixed frame.
-std::string MonitorPipeline::offWay(std::size_t body, const DecodedMesh& mesh, const Eigen::Isometry3d& fixed_from_mesh,
-                                    std::uint64_t times_forgotten) {
-  if (isStatic(body) || mesh.frame_id == fixed_frame_) {
-    carried_[body].reset();
-    return {};
-  }
-  const std::optional<Carried> last = std::exchange(
-      carried_[body], Carried{mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh, mesh.positions});
-  // With another number of vertices there is no step. Where the frame is another one now, nobody says how it went.
-  if (!last || last->frame_id != mesh.frame_id || last->positions.size() != mesh.positions.size()) return {};
-  const std::vector<SeenPose> seen = posesBetween(fixed_frame_, mesh.frame_id, last->at, mesh.stamp_ns);
-  double off_m = 0;
-  for (const SeenPose& one : seen) {
-    if (!one.pose.matrix().allFinite()) return one.why_unknown;
-    // A frame that stands still, as a camera's on its mount, costs no look at the vertices.
-    if (one.pose.isApprox(fixed_from_mesh, STILL) && last->pose.isApprox(fixed_from_mesh, STILL)) continue;
-    const double u =
-        static_cast<double>(one.stamp_ns - last->at.stamp_ns) / static_cast<double>(mesh.stamp_ns - last->at.stamp_ns);
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-      const Vec3 &from = last->positions[v], &to = mesh.positions[v];
-      const Vec3 straight = (1 - u) * (last->pose * from) + u * (fixed_from_mesh * to);
-      off_m = std::max(off_m, (one.pose * ((1 - u) * from + u * to) - straight).norm());
-    }
-  }
-  if (off_m <= config_.monitor.detector.rigid_tolerance_m) return {};
-  std::ostringstream text;
-  text << "between two of its frames tf has its frame '" << shortText(mesh.frame_id, MAX_NAME) << "' up to " << off_m
-       << " m off the straight way; send its mesh more often, or in the fixed frame";
-  return text.str();
-}
-
-/// Next to the stamp something of the way is missing.
-std::string MonitorPipeline::doubtAt(const std::string& target, const std::string& source, StampNs stamp_ns) const {
-  if (target == source) return {};
-  std::vector<TransformFeed::NewParent> changes;
-  transforms_.stampsBetween(target, source, stamp_ns - 1, stamp_ns + 1, changes);
-  for (const TransformFeed::NewParent& change : changes) {
-    if (!change.now) return unknownBefore(change).why_unknown;
-  }
-  return {};
-}
-
-/// Steps that wait for other bodies will be answered with what is held only now, and the next one begins where the
-/// last of them ends.
-std::vector<SeenPose> MonitorPipeline::lookBack(const std::string& target, const std::string& source) const {
-  std::vector<SeenPose> seen;
-  if (target == source) return seen;
-  const StampNs start_ns = monitor_->nextStart();
-  for (auto frame = clock_frames_.begin(); frame != clock_frames_.end(); ++frame) {
-    const auto next = std::next(frame);
-    if (next == clock_frames_.end()) {
-      SeenPose last{frame->stamp_ns, {}};
-      std::string unused;  // the next frame asks again
-      if (transforms_.lookup(target, source, frame->stamp_ns, last.pose, unused)) seen.push_back(last);
-    } else if (start_ns != 0 && frame->stamp_ns >= start_ns) {
-      const std::vector<SeenPose> step = posesFrom(target, source, *frame, next->stamp_ns);
-      seen.insert(seen.end(), step.begin(), step.end());
-    }
-  }
-  return seen;
-}
-
-void MonitorPipeline::keepClockFrame(const ClockFrame& frame) {
-  if (frame.stamp_ns == clockNs()) return;  // a duplicate, at which no step ends
-  if (frame.stamp_ns < clockNs()) clock_frames_.clear();
-  clock_frames_.push_back(frame);
-  const StampNs start_ns = monitor_->nextStart();
-  while (clock_frames_.size() > 1 && (start_ns == 0 || clock_frames_.front().stamp_ns < start_ns)) {
-    clock_frames_.pop_front();
-  }
-}
-
-/// As posesBetween(), and where it was at the first of the two, which may lie between two stamps of tf.
-std::vector<SeenPose> MonitorPipeline::posesFrom(const std::string& target, const std::string& source,
-                                                 const ClockFrame& from, StampNs to_ns) const {
-  std::vector<SeenPose> seen = posesBetween(target, source, from, to_ns);
-  if (!mayBeAStep(from.stamp_ns, to_ns)) return seen;
-  std::string unused;
-  SeenPose first{from.stamp_ns, {}};
-  const bool known = transforms_.lookup(target, source, from.stamp_ns, first.pose, unused);
-  // Of the step that ends there it may be known.
-  seen.push_back(known ? first : unknownAt(from.stamp_ns + 1, noTransformAt(from.stamp_ns)));
-  return seen;
-}
-
-bool MonitorPipeline::mayBeAStep(StampNs from_ns, StampNs to_ns) const {
-  return from_ns < to_ns && secondsBetween(from_ns, to_ns) <= config_.monitor.store.max_step_s + 1e-6;
-}
-
-/// Target_from_source at each stamp of tf between the two, as far back as a step may reach, and in the middle between
-/// such stamps: joint by joint a chain goes otherwise than from one pose to the other.
-std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, const std::string& source,
-                                                    const ClockFrame& from, StampNs to_ns) const {
-  std::vector<SeenPose> seen;
-  if (!mayBeAStep(from.stamp_ns, to_ns)) return seen;
-  // What tf saw before that, nobody knows any more.
-  if (transforms_.timesForgotten() != from.times_forgotten) {
-    return {unknownAt(to_ns - 1, FORGOTTEN)};
-  }
-  std::vector<TransformFeed::NewParent> changes;
-  std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from.stamp_ns, to_ns, changes);
-  if (stamps.size() > tolerance::MOST_POSES_A_STEP) {
-    return {unknownAt(stamps.back(), "more than " + std::to_string(tolerance::MOST_POSES_A_STEP) + " transforms")};
-  }
-  StampNs before_ns = from.stamp_ns;
-  stamps.push_back(to_ns);
-  std::string unused;
-  const auto look = [&](StampNs stamp_ns) {
-    SeenPose one{stamp_ns, {}};
-    if (transforms_.lookup(target, source, stamp_ns, one.pose, unused)) seen.push_back(one);
-  };
-  for (const StampNs stamp_ns : stamps) {
-    if (stamp_ns - before_ns > 1) look(before_ns + (stamp_ns - before_ns) / 2);
-    if (stamp_ns < to_ns) look(stamp_ns);
-    before_ns = stamp_ns;
-  }
-  std::transform(changes.begin(), changes.end(), std::back_inserter(seen), unknownBefore);
-  const auto isBefore = [](const SeenPose& a, const SeenPose& b) { return a.stamp_ns < b.stamp_ns; };
-  std::stable_sort(seen.begin(), seen.end(), isBefore);  // of equal stamps the last one counts
-  return seen;
+bool MonitorPipeline::knowsHeld(StampNs stamp_ns) const {
+  const std::set<std::string> frames = monitor_->heldFrames();
+  return std::all_of(frames.begin(), frames.end(), [&](const std::string& frame) {
+    Eigen::Isometry3d unused;
+    std::string reason;
+    return transforms_.lookup(fixed_frame_, frame, stamp_ns, unused, reason);
+  });
 }
 
 void MonitorPipeline::learnAnew(StepStatus status) {

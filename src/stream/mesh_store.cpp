@@ -252,17 +252,6 @@ std::vector<MeshStore::Stretch> MeshStore::pathWithin(StampNs from_ns, StampNs t
   return path;
 }
 
-std::vector<SeenPose> MeshStore::seenWithin(StampNs from_ns, StampNs to_ns) const {
-  std::vector<SeenPose> within;
-  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < frames_.size(); ++i) {
-    const MeshFrame& frame = *frames_[i].frame;
-    std::copy_if(frame.seen.begin(), frame.seen.end(), std::back_inserter(within),
-                 [&](const SeenPose& seen) { return seen.stamp_ns > from_ns && seen.stamp_ns < to_ns; });
-    if (frame.stamp_ns >= to_ns) break;
-  }
-  return within;
-}
-
 void MeshStore::forgetBefore(StampNs stamp_ns) {
   // The frame at or just before the stamp is still needed to interpolate, and the newest two to extrapolate.
   while (frames_.size() > 2 && frames_[1].frame->stamp_ns <= stamp_ns) forgetOldest();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -175,7 +176,6 @@ StepStatus Monitor::Impl::push(std::size_t body, MeshFrame frame, std::int64_t n
 /// stamps lie after its new time, are of no use.
 void Monitor::Impl::jumpBackTo(StampNs stamp_ns) {
   dropWaiting(StepStatus::NO_BODY, "time jumped back while waiting");
-  forgetHeldSeen();
   for (std::size_t b = 0; b < stores.size(); ++b) {
     const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
                        secondsBetween(stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
@@ -212,18 +212,26 @@ void Monitor::setBody(std::size_t body, Body what) {
   m.told_runs.resize(bodies.size());
   m.references.frames.resize(bodies.size());
   m.references.topologies.resize(bodies.size());
-  m.held_seen.resize(bodies.size());
   m.stores.resize(bodies.size(), MeshStore(m.options.store));
   m.bodies = std::move(bodies);
   m.stores[body].clear();
   m.told_runs[body] = 0;
   m.references.frames[body] = nullptr;
   m.references.topologies[body] = nullptr;
-  m.held_seen[body].clear();
   m.forgetOwnVoxels(body);
 }
 
-StampNs Monitor::nextStart() const { return impl_->oldestStart(0); }
+void Monitor::setTracks(const FrameTracks* tracks) { impl_->tracks = tracks; }
+
+std::vector<StampNs> Monitor::stampsToCome() const {
+  std::set<StampNs> stamps;
+  for (const Impl::Pending& step : impl_->pending) {
+    if (step.from) stamps.insert({step.from->stamp_ns, step.to->stamp_ns});
+  }
+  const MeshStore& clock = impl_->stores[impl_->options.clock_body];
+  if (!clock.empty()) stamps.insert(clock.newest().stamp_ns);
+  return {stamps.begin(), stamps.end()};
+}
 
 void Monitor::withdraw(std::size_t body) {
   Impl& m = *impl_;
@@ -251,7 +259,6 @@ void Monitor::reset(StepStatus status) {
     if (m.isStream(b)) m.stores[b].clear();
   }
   if (status == StepStatus::RESET) m.forgetReferences();
-  m.forgetHeldSeen();
   m.told_runs.assign(m.bodies.size(), 0);
   m.forgetLast();
   m.tracker.seam();

@@ -51,10 +51,7 @@ struct Monitor::Impl {
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;              // of the step that is made
   std::vector<std::string> thinned_out;  // of that step, in words
-  /// For the steps to come: per body, and by the frames of maps.
-  using PosesByStamp = std::map<StampNs, SeenPose>;
-  std::vector<PosesByStamp> held_seen;
-  std::map<std::string, PosesByStamp> map_seen;
+  const FrameTracks* tracks = nullptr;
   History history, side_history, doubt_history;  // of steps; of predictions and checks; of voxels in doubt
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
@@ -71,7 +68,6 @@ struct Monitor::Impl {
     counters.resize(bodies.size());
     runs.resize(bodies.size());
     told_runs.resize(bodies.size());
-    forgetHeldSeen();
     forgetReferences();
   }
 
@@ -99,17 +95,13 @@ struct Monitor::Impl {
   /// Where the body's run is another one than outcomes have told of, the step is one of seam, once.
   void dropAtSeam(std::size_t body, Pending& step);
   Step place(const Pending& pending);
+  /// What of the body's way contradicts the step's, or is not known: its frames between the step's ends; what carries
+  /// it from one frame to the next; what of it came between the stamps and was not used.
   void lookBetween(std::size_t body, Step& step) const;
-  /// Says of the step what came of the body between the stamps and was not used.
+  void lookAtCarrier(std::size_t body, const MeshFrame& from, const MeshFrame& to, Step& step) const;
   void lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const;
-  void lookAtHeld(Step& step) const;
-  /// The earliest stamp at which a step to come may begin; where none is known of, the given one.
-  StampNs oldestStart(StampNs otherwise) const;
-  void keepSeen(const std::vector<SeenPose>& poses, PosesByStamp& all) const;
-  void forgetHeldSeen() {
-    held_seen.assign(bodies.size(), {});
-    map_seen.clear();
-  }
+  /// The same of what is held where it was placed once: static bodies and the map. epoch: of the step's first frame.
+  void lookAtHeld(std::uint64_t epoch, Step& step) const;
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();
   /// Nothing is carried over a seam.

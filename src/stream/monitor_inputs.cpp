@@ -9,6 +9,10 @@
 namespace dccd {
 namespace {
 
+constexpr double STILL = 1e-12;  // of a pose's numbers: what interpolating between two equal ones may round
+
+const char* const FORGOTTEN = "stamps of tf went back, or a static transform is another one";
+
 std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
   return radius_m.empty() ? nullptr : share(std::move(radius_m));
 }
@@ -28,6 +32,10 @@ double offPath(const MeshFrame& frame, const Body& body, double u) {
     off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared
   }
   return off;
+}
+
+double fractionOf(const Step& step, StampNs stamp_ns) {
+  return static_cast<double>(stamp_ns - step.start_ns) / static_cast<double>(step.stamp_ns - step.start_ns);
 }
 
 /// How far the two poses bring points within the bounds from each other: the most that they do its corners [m].
@@ -57,6 +65,40 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
     if (meetsMap(body)) bounds.extend(boundsOf(body));
   }
   return bounds;
+}
+
+/// How far a rigid body leaves the path of the step on that of what carries it, of which the knots begin where the body
+/// is in this frame [m].
+double offArc(const std::vector<Knot>& knots, const MeshFrame& from, const Body& body, const Step& step) {
+  const Eigen::Isometry3d carrier_from_t0 = knots.front().pose.inverse() * from.pose * body.pose_t0.inverse();
+  const Eigen::AlignedBox3d bounds = boundsOf(body);
+  double off = 0;
+  for (const Knot& knot : knots) {
+    if (knot.stamp_ns < step.start_ns || knot.stamp_ns > step.stamp_ns) continue;
+    const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionOf(step, knot.stamp_ns));
+    off = std::max(off, apart(knot.pose * carrier_from_t0, on_path * body.pose_t0.inverse(), bounds));
+  }
+  return off;
+}
+
+/// How far vertices leave the straight way between two frames on that of what carries them, of which the knots are
+/// [m].
+double offChord(const std::vector<Knot>& knots, const MeshFrame& from, const MeshFrame& to) {
+  const Eigen::Isometry3d &from_pose = knots.front().pose, &to_pose = knots.back().pose;
+  const Eigen::Isometry3d from_back = from_pose.inverse(), to_back = to_pose.inverse();
+  double off = 0;
+  for (const Knot& knot : knots) {
+    // A frame that stands still, as a camera's on its mount, costs no look at the vertices.
+    if (knot.pose.isApprox(to_pose, STILL) && from_pose.isApprox(to_pose, STILL)) continue;
+    const double u =
+        static_cast<double>(knot.stamp_ns - from.stamp_ns) / static_cast<double>(to.stamp_ns - from.stamp_ns);
+    for (std::size_t v = 0; v < to.positions.size(); ++v) {
+      const Vec3 &t0 = from.positions[v], &t1 = to.positions[v];
+      const Vec3 carried = knot.pose * ((1 - u) * (from_back * t0) + u * (to_back * t1));
+      off = std::max(off, (carried - ((1 - u) * t0 + u * t1)).norm());
+    }
+  }
+  return off;
 }
 
 std::string unknown(const std::string& name, const std::string& why) {
@@ -134,15 +176,11 @@ void Monitor::Impl::dropAtSeam(std::size_t body, Pending& step) {
 void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   Body& body = step.bodies[b];
   const auto frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
-  const std::vector<SeenPose> seen = stores[b].seenWithin(step.start_ns, step.stamp_ns);
-  const auto fractionAt = [&](StampNs stamp_ns) {
-    return static_cast<double>(stamp_ns - step.start_ns) / static_cast<double>(step.stamp_ns - step.start_ns);
-  };
   double off_m = 0;
   bool lost = false;
   for (const std::shared_ptr<const MeshFrame>& frame : frames) {
     lost = lost || hasLost(*frame, body);
-    off_m = std::max(off_m, offPath(*frame, body, fractionAt(frame->stamp_ns)));
+    off_m = std::max(off_m, offPath(*frame, body, fractionOf(step, frame->stamp_ns)));
     if (!frame->radius_m.empty()) {
       body.radius_m = radii(largerRadii(body.radius_m ? *body.radius_m : std::vector<double>(), frame->radius_m));
     }
@@ -151,24 +189,41 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   if (lost) {
     addSentence(step.off_path, unknown("body '" + body.name + "'", "a frame between its ends has lost vertices"));
   }
-  const Eigen::AlignedBox3d bounds = seen.empty() ? Eigen::AlignedBox3d() : boundsOf(body);
-  const Eigen::Isometry3d from_t0 = body.pose_t0.inverse();
-  for (const SeenPose& one : seen) {
-    if (!one.pose.matrix().allFinite()) {
-      addSentence(step.off_path, unknown("body '" + body.name + "'", one.why_unknown));
-      break;
-    }
-    const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionAt(one.stamp_ns));
-    off_m = std::max(off_m, apart(one.pose * from_t0, on_path * from_t0, bounds));
+  if (off_m > options.detector.rigid_tolerance_m) {
+    std::ostringstream text;
+    text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in "
+         << frames.size() << " frames between its ends; make it the clock_body";
+    addSentence(step.off_path, text.str());
   }
+  for (const MeshStore::Stretch& stretch : stores[b].pathWithin(step.start_ns + 1, step.stamp_ns - 1)) {
+    lookAtCarrier(b, *stretch.from, *stretch.to, step);
+  }
+}
+
+/// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it. A
+/// step takes them straight in the fixed frame; a rigid body along its arc from the step's one end to the other.
+void Monitor::Impl::lookAtCarrier(std::size_t b, const MeshFrame& from, const MeshFrame& to, Step& step) const {
+  const Body& body = step.bodies[b];
+  const auto say = [&](const std::string& why) {
+    addSentence(step.off_path, unknown("body '" + body.name + "'", why));
+  };
+  if (!tracks || (from.carrier.frame.empty() && to.carrier.frame.empty())) return;
+  if (from.carrier.frame != to.carrier.frame) return say("the frame that carries it is another one than before");
+  if (from.carrier.epoch != tracks->epoch() || to.carrier.epoch != tracks->epoch()) return say(FORGOTTEN);
+  const std::vector<Knot> knots = tracks->between({}, to.carrier.frame, from.stamp_ns, to.stamp_ns, to.carrier.silence);
+  const auto why = std::find_if(knots.begin(), knots.end(), [](const Knot& knot) { return !knot.why_unknown.empty(); });
+  if (why != knots.end()) return say(why->why_unknown);
+  if (knots.empty() || from.stamp_ns == to.stamp_ns) return;
+  const double off_m = to.rigid ? offArc(knots, from, body, step) : offChord(knots, from, to);
   if (off_m <= options.detector.rigid_tolerance_m) return;
   std::ostringstream text;
-  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in ";
-  if (body.rigid) {
-    text << "poses of tf between its ends; send the mesh of '" << bodies[options.clock_body].name << "' more often";
-  } else {
-    text << frames.size() << " frames between its ends; make it the clock_body";
+  if (!to.rigid) {
+    text << "between two of its frames tf has its frame '" << to.carrier.frame << "' up to " << off_m
+         << " m off the straight way; send its mesh more often, or in the fixed frame";
+    return say(text.str());
   }
+  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in poses of tf "
+       << "between its ends; send the mesh of '" << bodies[options.clock_body].name << "' more often";
   addSentence(step.off_path, text.str());
 }
 
@@ -178,32 +233,37 @@ void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_
   if (!why.empty()) addSentence(step.off_path, unknown("body '" + bodies[body].name + "'", why));
 }
 
-/// A static body and the map are held where they were. What tf said since must not be contradicted in silence.
-void Monitor::Impl::lookAtHeld(Step& step) const {
-  const auto of_map = map_seen.find(step.map.frame_id);
+/// What tf says since they were placed must not be contradicted in silence.
+void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Step& step) const {
   for (std::size_t b = 0; b <= bodies.size(); ++b) {
     const bool is_map = b == bodies.size();
-    if (is_map ? !step.map.surface || of_map == map_seen.end() : isStream(b) || stores[b].empty()) continue;
-    const PosesByStamp& seen = is_map ? of_map->second : held_seen[b];
-    const std::string doubt = is_map ? std::string() : stores[b].newest().doubt;
-    const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
-    double off_m = 0;
-    const SeenPose* unknown_at = nullptr;
-    Eigen::AlignedBox3d bounds;
-    // From its start on: what is elsewhere there moves back within the step.
-    const auto end = seen.upper_bound(step.stamp_ns);
-    for (auto one = seen.lower_bound(step.start_ns); one != end; ++one) {
-      const Eigen::Isometry3d& pose = one->second.pose;
-      if (!unknown_at && !pose.matrix().allFinite()) unknown_at = &one->second;
-      if (unknown_at || pose.matrix() == held.matrix()) continue;
-      if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
-      off_m = std::max(off_m, is_map ? apart(pose, held, bounds)
-                                     : apart(pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
+    if (is_map ? !step.map.surface : isStream(b) || stores[b].empty()) continue;
+    const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
+    const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
+    const std::string name =
+        is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
+    const auto say = [&](const std::string& why) { addSentence(step.off_path, unknown(name, why)); };
+    if (frame && !frame->doubt.empty()) say(frame->doubt);
+    if (!tracks || carrier.empty()) continue;
+    const std::vector<Knot> knots =
+        is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)
+               : tracks->between({}, carrier, step.start_ns, step.stamp_ns, frame->carrier.silence);
+    if (!knots.empty() && epoch != tracks->epoch()) {
+      say(FORGOTTEN);
+      continue;
     }
-    const std::string name = is_map ? "the octomap's frame '" + step.map.frame_id + "'"
-                                    : "the frame of the static body '" + bodies[b].name + "'";
-    if (unknown_at || !doubt.empty()) {
-      addSentence(step.off_path, unknown(name, unknown_at ? unknown_at->why_unknown : doubt));
+    const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : frame->pose;
+    double off_m = 0;
+    Eigen::AlignedBox3d bounds;
+    for (const Knot& knot : knots) {
+      if (!knot.why_unknown.empty()) {
+        say(knot.why_unknown);
+        break;
+      }
+      if (knot.pose.matrix() == held.matrix()) continue;
+      if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
+      off_m = std::max(off_m, is_map ? apart(knot.pose, held, bounds)
+                                     : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
     }
     if (off_m <= options.detector.rigid_tolerance_m) continue;
     std::ostringstream text;
@@ -235,13 +295,14 @@ Step Monitor::Impl::place(const Pending& pending) {
     }
     if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
       placeBetween(pending.from, pending.to, body);
+      lookAtCarrier(b, *pending.from, *pending.to, step);
     } else {
       placeBetween(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
       lookBetween(b, step);
     }
     stores[b].forgetBefore(wayNeededFrom(b, step.stamp_ns));
   }
-  lookAtHeld(step);
+  lookAtHeld(pending.from->carrier.epoch, step);
   keepReferences(step, references);
   return step;
 }
@@ -280,29 +341,6 @@ bool Monitor::Impl::separates(const Body& body) const {
   const auto named = [](const SeparationFrom& from) { return from.separation_m > 0; };
   return body.minimum_separation_m > 0 || body.radius_m ||
          std::any_of(body.separations.begin(), body.separations.end(), named);
-}
-
-void Monitor::seen(std::size_t body, const std::vector<SeenPose>& poses) {
-  impl_->keepSeen(poses, impl_->held_seen.at(body));
-}
-
-void Monitor::mapSeen(const std::string& frame, const std::vector<SeenPose>& poses) {
-  impl_->keepSeen(poses, impl_->map_seen[frame]);
-}
-
-void Monitor::Impl::keepSeen(const std::vector<SeenPose>& poses, PosesByStamp& all) const {
-  for (const SeenPose& one : poses) all.insert_or_assign(one.stamp_ns, one);
-  // Also where no step is ever made.
-  if (!all.empty()) all.erase(all.begin(), all.lower_bound(oldestStart(all.rbegin()->first)));
-}
-
-StampNs Monitor::Impl::oldestStart(StampNs otherwise) const {
-  const MeshStore& clock = stores[options.clock_body];
-  StampNs oldest = clock.empty() ? otherwise : clock.newest().stamp_ns;
-  for (const Pending& step : pending) {
-    if (step.from) oldest = std::min(oldest, step.from->stamp_ns);
-  }
-  return oldest;
 }
 
 }  // namespace dccd

@@ -33,22 +33,22 @@ const ObstacleMap& Monitor::map() const {
 
 const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
 
-std::set<std::string> Monitor::mapFrames() const {
+std::set<std::string> Monitor::heldFrames() const {
+  const Impl& m = *impl_;
   std::set<std::string> frames;
-  if (impl_->map.surface) frames.insert(impl_->map.frame_id);
-  for (const ObstacleMap& one : impl_->maps_to_come) frames.insert(one.frame_id);
+  if (m.map.surface) frames.insert(m.map.frame_id);
+  for (const ObstacleMap& one : m.maps_to_come) frames.insert(one.frame_id);
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    if (m.isStream(b) || m.stores[b].empty()) continue;
+    const Carrier& carrier = m.stores[b].newest().carrier;
+    if (carrier.silence == Silence::UNKNOWN) frames.insert(carrier.frame);
+  }
+  frames.erase("");
   return frames;
 }
 
 void Monitor::setMap(ObstacleMap map) {
   Impl& m = *impl_;
-  if (!map.frame_id.empty()) {  // steps that wait may have another map, of the same frame, after none
-    std::set<std::string> frames = mapFrames();
-    frames.insert(map.frame_id);
-    for (auto one = m.map_seen.begin(); one != m.map_seen.end();) {
-      one = frames.count(one->first) ? std::next(one) : m.map_seen.erase(one);
-    }
-  }
   const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface && !map.own.doubted_surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
     if (!m.maps_to_come.empty()) m.missed_maps = "they waited for the bodies' frames when the map was void";

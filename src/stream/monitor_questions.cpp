@@ -35,9 +35,12 @@ Outcome Monitor::checkNow() {
   m.keepReferences(step, references);
   step.start_ns = step.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   step.map = m.usableMap(step.stamp_ns);
-  m.lookAtHeld(step);
-  for (std::size_t b = 0; b < m.bodies.size(); ++b) {  // also what came after the newest
-    if (m.isStream(b)) m.lookForUnused(b, m.stores[b].newest().stamp_ns, std::numeric_limits<StampNs>::max(), step);
+  m.lookAtHeld(m.stores[m.options.clock_body].newest().carrier.epoch, step);
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    if (!m.isStream(b)) continue;
+    const MeshFrame& newest = m.stores[b].newest();
+    m.lookAtCarrier(b, newest, newest, step);
+    m.lookForUnused(b, newest.stamp_ns, std::numeric_limits<StampNs>::max(), step);  // what came after it
   }
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.

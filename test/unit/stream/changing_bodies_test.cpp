@@ -34,7 +34,7 @@ class ChangingBodies : public ::testing::Test {
   }
   void come(std::size_t body, const std::string& name, double z) {
     monitor.setBody(body, named(name));
-    push(body, monitor.nextStart(), z);
+    push(body, monitor.stampsToCome().front(), z);
   }
 };
 
@@ -81,7 +81,7 @@ TEST_F(ChangingBodies, WhatTouchesElsewhereGoesOn) {
   }
   // It goes: its own patch ends, the other one does not.
   monitor.setBody(2, named("other"));
-  push(2, monitor.nextStart(), 5);
+  push(2, monitor.stampsToCome().front(), 5);
   const Outcome after = step({-0.5, 5});
   ASSERT_EQ(after.patches.size(), 1u);
   EXPECT_EQ(after.patches[0].id, before.patches[0].id);
@@ -100,7 +100,7 @@ TEST_F(ChangingBodies, WhatTouchesBehindABodyThatShrinksGoesOn) {
   monitor.setBody(1, named("nothing"));
   const auto nothing = share(Topology::fromTriangles(0, {}));
   const auto pushNothing = [&](StampNs at_ns) { monitor.push(1, {at_ns, nothing, {}}, NOW); };
-  pushNothing(monitor.nextStart());
+  pushNothing(monitor.stampsToCome().front());
   stamp_ns += 100 * MS;
   pushNothing(stamp_ns);
   push(2, stamp_ns, -0.5);
@@ -122,7 +122,7 @@ TEST_F(ChangingBodies, StepsThatWaitAreAnsweredWithIt) {
   monitor.push(0, floor(stamp_ns, 0), NOW);
   Outcome outcome;
   ASSERT_FALSE(monitor.next(NOW, outcome)) << "waits for the tip";
-  EXPECT_EQ(monitor.nextStart(), stamp_ns - 100 * MS);
+  EXPECT_EQ(monitor.stampsToCome().front(), stamp_ns - 100 * MS);
   come(2, "box", 1);
   push(2, stamp_ns, 1);
   push(1, stamp_ns, 1);
@@ -163,7 +163,7 @@ TEST(ChangingBodiesDistances, OfABodyAndItselfGoOn) {
   step(0.5, true);
   expectMeasured(step(0.5, true));
   monitor.setBody(1, named("box"));
-  monitor.push(1, tip(monitor.nextStart(), 50), NOW);
+  monitor.push(1, tip(monitor.stampsToCome().front(), 50), NOW);
   monitor.push(1, tip(stamp_ns + 100 * MS, 50), NOW);
   expectMeasured(step(0.5, true));
   options.detector.clearance.wanted = false;

@@ -80,25 +80,6 @@ TEST_F(TwoBodies, AJumpOfAnotherBodyBetweenTwoStepsIsASeam) {
   }
 }
 
-// What is said of the map's frame with each frame is kept for steps that may come; where the other body never comes, or
-// each frame is a seam, none does.
-TEST_F(TwoBodies, PosesOfWhatIsHeldAreNotKeptForStepsThatNeverCome) {
-  MonitorOptions teleports = loose();
-  teleports.store.max_vertex_step_m = 0.1;
-  for (const MonitorOptions& options : {loose(), teleports}) {
-    Monitor two(options, {named("floor"), named("tip")});
-    for (int k = 0; k < 3000; ++k) {
-      std::vector<SeenPose> seen;
-      for (int i = 1; i <= 10; ++i) seen.push_back({(100 * k + 10 * i) * MS, Eigen::Isometry3d::Identity()});
-      two.mapSeen("odom", seen);
-      two.push(0, floor((100 * k + 100) * MS, k % 2), NOW);
-      Outcome outcome;
-      while (two.next(LATER, outcome)) EXPECT_FALSE(outcome.answered);
-      ASSERT_LT(Monitor::Impl::of(two).map_seen.at("odom").size(), 100u) << "after " << k << " frames";
-    }
-  }
-}
-
 // Of the frames that a step lies between one had a face that could not be used: then not all was looked at. It was also
 // more uncertain: so was the step.
 TEST_F(TwoBodies, WhatAnyFrameOfTheStepLacksIsMissing) {
