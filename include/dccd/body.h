@@ -39,6 +39,13 @@ struct SeparationFrom {
 /// Body::own_voxels_m, whatever the map's resolution.
 constexpr double ONE_VOXEL = -1;
 
+/// Where a body is between a step's ends.
+struct Waypoint {
+  double u = 0;                                            ///< fraction of the step, in (0,1)
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< of one that turns: fixed_from_body there
+  std::shared_ptr<const Positions> positions{};            ///< of others: where its vertices are there; null: it turns
+};
+
 /// Large parts are shared, never changed: a copy of a body costs no positions.
 struct Body {
   // What it is and what it is tested against: the same in every step of a stream.
@@ -67,6 +74,9 @@ struct Body {
   std::shared_ptr<const Positions> t0, t1;
   bool turns = false;  ///< moves from pose_t0 to pose_t1 along the rotation, not straight
   Eigen::Isometry3d pose_t0 = Eigen::Isometry3d::Identity(), pose_t1 = Eigen::Isometry3d::Identity();
+  /// Between these, ascending, it goes as it does from t0 to t1 where there are none. Those that it does not leave by
+  /// more than rigid_tolerance_m without them are of no use. Not with Step::pose_scale.
+  std::vector<Waypoint> waypoints;
   /// Uncertainty radius per vertex during the whole step [m], finite and 0 or more; null: none. A pair's separation
   /// grows by the largest radius of each of its two features. Needs accuracy conservative.
   std::shared_ptr<const std::vector<double>> radius_m;

@@ -19,18 +19,31 @@ static_assert(static_cast<int>(ClearanceStatus::UNKNOWN) == static_cast<int>(Dis
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 constexpr double ROUNDING = 1 + 1e-12;  // of the few operations of a speed
 
-/// In the step no point of the body was faster [m/s]. One that turns goes along arcs about its frame's origin.
-double speedBound(const Body& body, double duration_s) {
+/// No point of the body goes farther on the way from one place to another [m]. One that turns does so about its frame's
+/// origin.
+double lengthBound(const Body& body, const Waypoint& from, const Waypoint& to) {
   double most_m = 0;
   if (body.turns) {
-    const Vec3 from = body.pose_t0.translation();
-    for (const Vec3& p : *body.t0) most_m = std::max(most_m, (p - from).norm());
-    most_m *= Eigen::AngleAxisd(body.pose_t0.linear().transpose() * body.pose_t1.linear()).angle();
-    most_m += (body.pose_t1.translation() - from).norm();
-  } else {
-    for (std::size_t v = 0; v < body.t0->size(); ++v) most_m = std::max(most_m, ((*body.t1)[v] - (*body.t0)[v]).norm());
+    for (const Vec3& p : *body.t0) most_m = std::max(most_m, (p - body.pose_t0.translation()).norm());
+    most_m *= Eigen::AngleAxisd(from.pose.linear().transpose() * to.pose.linear()).angle();
+    return most_m + (to.pose.translation() - from.pose.translation()).norm();
   }
-  return most_m * ROUNDING / duration_s;
+  for (std::size_t v = 0; v < body.t0->size(); ++v)
+    most_m = std::max(most_m, ((*to.positions)[v] - (*from.positions)[v]).norm());
+  return most_m;
+}
+
+/// In the step no point of the body was faster [m/s].
+double speedBound(const Body& body, double duration_s) {
+  double fastest = 0;
+  Waypoint from{0, body.pose_t0, body.t0};
+  const auto goTo = [&](const Waypoint& to) {
+    fastest = std::max(fastest, lengthBound(body, from, to) / (to.u - from.u));
+    from = to;
+  };
+  for (const Waypoint& point : body.waypoints) goTo(point);
+  goTo({1, body.pose_t1, body.t1});
+  return fastest * ROUNDING / duration_s;
 }
 
 /// How far the feature's point at the step's end moved in the step [m]: as its vertices did, each by its weight.

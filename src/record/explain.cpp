@@ -145,7 +145,7 @@ class Explanation {
       : step_(step),
         options_(plain(options)),
         kind_(question.kind),
-        parts_(std::min(neededParts(step, options.rigid_tolerance_m), options.max_substeps)) {
+        parts_(partsAllowed(neededParts(step, options.rigid_tolerance_m), options.max_substeps)) {
     const auto& size = factsOf(kind_).vertices;
     features_.push_back(featureOf(step, question.body[0], question.vertex.data(), size[0]));
     if (!isOnMap()) features_.push_back(featureOf(step, question.body[1], question.vertex.data() + size[0], size[1]));

@@ -23,8 +23,8 @@ constexpr std::size_t MAX_BODIES = 65534;
 enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1, EDGES = 2 };
 
 // The least bytes that one item of a list takes.
-constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 51, INTERSECTION_BYTES = 25,
-                      EXPECTATION_BYTES = 32, PATCH_BYTES = 200, TEXT_BYTES = 4;
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, WAYPOINT_BYTES = 144, CONTACT_BYTES = 51,
+                      INTERSECTION_BYTES = 25, EXPECTATION_BYTES = 32, PATCH_BYTES = 200, TEXT_BYTES = 4;
 
 template <typename Archive, typename Pose>
 void visitPose(Archive& a, Pose& pose) {
@@ -128,6 +128,17 @@ void visitOptions(Archive& a, Options& options) {
   }
 }
 
+void checkWaypoints(RecordingReader& a, const Body& body) {
+  double before = 0;
+  for (const Waypoint& point : body.waypoints) {
+    if (!(point.u > before && point.u < 1)) a.fail("a waypoint is at " + std::to_string(point.u) + " of the step");
+    if (point.positions->size() != (body.turns ? 0 : body.t0->size())) {
+      a.fail("a waypoint of body '" + body.name + "' has " + std::to_string(point.positions->size()) + " vertices");
+    }
+    before = point.u;
+  }
+}
+
 template <typename Archive, typename Body>
 void visitBody(Archive& a, Body& body) {
   visitValues(a, body.name, body.motion, body.rigid, body.self_collision, body.against_bodies, body.against_obstacle,
@@ -138,6 +149,13 @@ void visitBody(Archive& a, Body& body) {
   visitPose(a, body.pose_t0);
   visitPose(a, body.pose_t1);
   visitValues(a, body.shell, body.dropped_faces);
+  a.count(body.waypoints, WAYPOINT_BYTES);
+  for (auto& point : body.waypoints) {
+    a.number(point.u);
+    visitPose(a, point.pose);
+    a.shared(point.positions);
+  }
+  if constexpr (Archive::READS) checkWaypoints(a, body);
 }
 
 /// As Topology::polyline() makes it.

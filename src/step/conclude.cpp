@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <tuple>
+
+#include "step/parts.h"
 
 namespace dccd {
 namespace {
@@ -100,6 +103,18 @@ std::string takeUnchecked(const Step& step, StepStats& stats) {
   return text;
 }
 
+/// What it is cut into parts for.
+std::string waysInWords(const Step& step) {
+  std::ostringstream text;
+  for (const Body& body : step.bodies) {
+    const double off_m = offWay(body, body.waypoints);
+    if (off_m > 0)
+      text << (text.str().empty() ? "" : ", ") << "body '" << body.name << "' was seen up to " << off_m
+           << " m off the way from the step's start to its end";
+  }
+  return text.str().empty() ? "a rigid body turns far" : text.str();
+}
+
 /// Why it is less than a whole answer, if it is. Reasons come in ascending order of weight, and the last one gives the
 /// status; each that stands in the way of a proof also goes into `unproved`.
 void judge(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
@@ -139,8 +154,11 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
         ran_out + " before all of the start state was looked at; no pair was left out of the contacts");
   }
   if (outcome.substeps < needed_parts) {
-    say(StepStatus::PARTIAL, "a rigid body turns so far that " + std::to_string(needed_parts) +
-                                 " parts are needed; max_substeps is " + std::to_string(outcome.substeps));
+    say(StepStatus::PARTIAL,
+        waysInWords(step) + ", so that " +
+            (needed_parts == NO_NUMBER_OF_PARTS ? std::string("no number of equal parts follows it")
+                                                : std::to_string(needed_parts) + " parts are needed") +
+            "; max_substeps is " + std::to_string(outcome.substeps));
   }
   if (options.obstacle_expected && !step.map.surface) {
     say(StepStatus::NO_MAP, step.map.problem + "; checked without it");

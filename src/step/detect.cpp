@@ -39,10 +39,10 @@ void keepFirst(bool cells, std::vector<Contact>& contacts) {
   contacts.erase(std::remove_if(contacts.begin(), contacts.end(), late), contacts.end());
 }
 
-/// How often the step is to be cut for the bodies that turn, and how many these are.
+/// How often the step is to be cut for the bodies that turn or have waypoints, and how many these are.
 std::size_t countParts(const Step& step, const Options& options, const SceneArrays& scene, StepStats& stats) {
-  const auto turning =
-      std::count_if(step.bodies.begin(), step.bodies.end(), [](const Body& body) { return body.turns; });
+  const auto turning = std::count_if(step.bodies.begin(), step.bodies.end(),
+                                     [](const Body& body) { return body.turns || !body.waypoints.empty(); });
   if (turning == 0) return 1;
   const Clock::time_point start = Clock::now();
   const std::size_t needed = neededParts(step, options.rigid_tolerance_m, scene.bodies());
@@ -82,7 +82,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (!continues) carried.clear();
   Outcome outcome;
   const std::size_t needed = countParts(step, options, scene, outcome.stats);
-  const std::size_t parts = std::min(needed, options.max_substeps);
+  const std::size_t parts = partsAllowed(needed, options.max_substeps);
   outcome.start_ns = step.start_ns;
   outcome.stamp_ns = step.stamp_ns;
   outcome.sequence = step.sequence;

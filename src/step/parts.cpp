@@ -1,7 +1,9 @@
 #include "step/parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include "dccd/mesh_store.h"
@@ -10,14 +12,51 @@
 namespace dccd {
 namespace {
 
+constexpr double MOST_PARTS_FOR_WAYPOINTS = 64;
+
 double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
   const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
   return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
 }
 
+/// Two neighbours of the step's ends and the waypoints, and how far between them.
+struct Leg {
+  const Eigen::Isometry3d *from_pose, *to_pose;
+  const Positions *from, *to;
+  double u;
+};
+
+/// On which of the body's ways from waypoint to waypoint it is at the fraction u of the step, and where on it.
+Leg legAt(const Body& body, double u) {
+  const std::vector<Waypoint>& points = body.waypoints;
+  const auto isBefore = [](const Waypoint& point, double at) { return point.u < at; };
+  const auto next = std::lower_bound(points.begin(), points.end(), u, isBefore);
+  const Waypoint* const from = next == points.begin() ? nullptr : &*std::prev(next);
+  const Waypoint* const to = next == points.end() ? nullptr : &*next;
+  const double from_u = from ? from->u : 0, to_u = to ? to->u : 1;
+  return {from ? &from->pose : &body.pose_t0, to ? &to->pose : &body.pose_t1,
+          from ? from->positions.get() : body.t0.get(), to ? to->positions.get() : body.t1.get(),
+          points.empty() ? u : (u - from_u) / (to_u - from_u)};
+}
+
 /// What moves a turning body from t0 to where it is at the fraction u of the step.
-Eigen::Isometry3d movedBy(const Step& step, const Body& body, double u) {
-  return interpolate(body.pose_t0, body.pose_t1, u * step.pose_scale) * body.pose_t0.inverse();
+Eigen::Isometry3d movedBy(double pose_scale, const Body& body, double u) {
+  const Leg leg = legAt(body, u);
+  return interpolate(*leg.from_pose, *leg.to_pose, leg.u * pose_scale) * body.pose_t0.inverse();
+}
+
+/// Where the vertices are at the fraction u of the step.
+Positions placedAt(double pose_scale, const Body& body, double u) {
+  Positions placed;
+  if (!body.turns) {
+    const Leg leg = legAt(body, u);
+    interpolate(*leg.from, *leg.to, leg.u, placed);
+    return placed;
+  }
+  const Eigen::Isometry3d motion = movedBy(pose_scale, body, u);
+  placed.resize(body.t0->size());
+  for (std::size_t v = 0; v < placed.size(); ++v) placed[v] = motion * (*body.t0)[v];
+  return placed;
 }
 
 double radiusOf(const Body& body) {
@@ -32,6 +71,62 @@ double sagitta(double radius, double angle) {
   return radius * 2 * half * half;
 }
 
+/// The corners of what the body spans at its start: of all that is affine in its vertices, the largest is at one.
+std::array<Vec3, 8> cornersOf(const Body& body) {
+  Eigen::AlignedBox3d bounds(Vec3::Zero());
+  bounds.setEmpty();
+  for (const Vec3& p : *body.t0) {
+    if (p.allFinite()) bounds.extend(p);
+  }
+  std::array<Vec3, 8> corners;
+  corners.fill(body.pose_t0.translation());
+  for (int i = 0; i < 8 && !bounds.isEmpty(); ++i) {
+    corners[static_cast<std::size_t>(i)] = bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+  }
+  return corners;
+}
+
+/// How far the body is at its waypoints from straight paths through so many equal parts [m]. Vertices that are not
+/// finite are not compared.
+double offParts(const Body& body, std::size_t parts) {
+  const double count = static_cast<double>(parts);
+  std::array<Vec3, 8> corners;
+  if (body.turns) corners = cornersOf(body);
+  double off = 0;
+  for (const Waypoint& point : body.waypoints) {
+    const double part = std::min(std::floor(point.u * count), count - 1), s = point.u * count - part;
+    if (body.turns) {
+      const Eigen::Isometry3d from = movedBy(1, body, part / count), to = movedBy(1, body, (part + 1) / count);
+      const Eigen::Isometry3d there = point.pose * body.pose_t0.inverse();
+      for (const Vec3& p : corners) off = std::max(off, (there * p - ((1 - s) * (from * p) + s * (to * p))).norm());
+    } else {
+      const Positions from = placedAt(1, body, part / count), to = placedAt(1, body, (part + 1) / count);
+      for (std::size_t v = 0; v < from.size(); ++v) {
+        off = std::max(off, ((*point.positions)[v] - ((1 - s) * from[v] + s * to[v])).norm());
+      }
+    }
+  }
+  return off;
+}
+
+/// The largest turn between two neighbours of the waypoints, the parts' ends and the step's, where it turns [rad].
+double turnBetween(const Body& body, double pose_scale, std::size_t parts) {
+  double most = 0, from_u = 0;
+  const auto add = [&](double u, const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+    // Of a leg as much as its share, at the most a part's.
+    const double share = std::min(1.0, 1 / (static_cast<double>(parts) * (u - from_u)));
+    most = std::max(most, share * pose_scale * rotationAngle(from, to));
+    from_u = u;
+  };
+  const Eigen::Isometry3d* from = &body.pose_t0;
+  for (const Waypoint& point : body.waypoints) {
+    add(point.u, *from, point.pose);
+    from = &point.pose;
+  }
+  add(1, *from, body.pose_t1);
+  return most;
+}
+
 /// Holds all of the body's ways through the step. One that turns does so about its frame's origin, which moves
 /// straight: on whichever way, no vertex is further from there than its radius.
 Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margin_m) {
@@ -40,13 +135,17 @@ Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margi
     const Vec3 from = body.pose_t0.translation();
     bounds.extend(from);
     bounds.extend(Vec3(from + step.pose_scale * (body.pose_t1.translation() - from)));
+    for (const Waypoint& point : body.waypoints) bounds.extend(Vec3(point.pose.translation()));
     margin_m += radiusOf(body);
   } else {
-    for (const Positions* positions : {body.t0.get(), body.t1.get()}) {
-      for (const Vec3& p : *positions) {
+    const auto extend = [&](const Positions& positions) {
+      for (const Vec3& p : positions) {
         if (p.allFinite()) bounds.extend(p);
       }
-    }
+    };
+    extend(*body.t0);
+    extend(*body.t1);
+    for (const Waypoint& point : body.waypoints) extend(*point.positions);
   }
   if (body.radius_m && !body.radius_m->empty()) {
     margin_m += *std::max_element(body.radius_m->begin(), body.radius_m->end());
@@ -71,14 +170,44 @@ double partsFor(const Body& body, double pose_scale, double tolerance_m, const E
   return isStraight(radius) ? 1 : std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius)));
 }
 
-double leavesArcBy(const Body& body, double pose_scale, double parts) {
-  if (!body.turns) return 0;
-  const double radius = radiusOf(body);
+/// Between neighbours of waypoints and parts' ends the way leaves its own chord by the sagitta at the most, and that
+/// chord leaves the part's by no more than its two ends do.
+double leavesWayBy(const Body& body, double pose_scale, std::size_t parts) {
+  if (!body.turns && body.waypoints.empty()) return 0;
+  const double radius = body.turns ? radiusOf(body) : 0;
   double largest = radius;
-  for (const Eigen::Isometry3d* pose : {&body.pose_t0, &body.pose_t1})
-    largest = std::max(largest, pose->translation().cwiseAbs().maxCoeff() + radius);
-  const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1);
-  return (sagitta(radius, angle / parts) + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
+  if (body.turns) {
+    for (const Eigen::Isometry3d* pose : {&body.pose_t0, &body.pose_t1})
+      largest = std::max(largest, pose->translation().cwiseAbs().maxCoeff() + radius);
+  }
+  for (const Waypoint& point : body.waypoints) {
+    if (body.turns) largest = std::max(largest, point.pose.translation().cwiseAbs().maxCoeff() + radius);
+    for (std::size_t v = 0; point.positions && v < point.positions->size(); ++v) {
+      const Vec3& p = (*point.positions)[v];
+      if (p.allFinite()) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+    }
+  }
+  const double arc = body.turns ? sagitta(radius, turnBetween(body, pose_scale, parts)) : 0;
+  return (offParts(body, parts) + arc + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
+}
+
+double offWay(const Body& body, const std::vector<Waypoint>& waypoints) {
+  std::array<Vec3, 8> corners;
+  if (body.turns && !waypoints.empty()) corners = cornersOf(body);
+  double off = 0;
+  for (const Waypoint& point : waypoints) {
+    if (body.turns) {
+      const Eigen::Isometry3d moved = interpolate(body.pose_t0, body.pose_t1, point.u) * body.pose_t0.inverse();
+      const Eigen::Isometry3d there = point.pose * body.pose_t0.inverse();
+      for (const Vec3& p : corners) off = std::max(off, (there * p - moved * p).norm());
+    } else {
+      for (std::size_t v = 0; v < point.positions->size(); ++v) {
+        const Vec3 &t0 = (*body.t0)[v], &t1 = (*body.t1)[v];
+        off = std::max(off, ((*point.positions)[v] - (t0 + point.u * (t1 - t0))).norm());
+      }
+    }
+  }
+  return off;
 }
 
 std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before, double apart_m) {
@@ -86,7 +215,7 @@ std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<
   // The tolerance is far above all rounding. A distance is told less what both bodies leave their arcs by.
   const double margin_m = std::max(largestSeparation(step.bodies), apart_m / 2) + tolerance_m;
   const auto boundsOf = [&](std::size_t b) -> const Eigen::AlignedBox3d& {
-    const double leaves_m = apart_m > 0 && !bounds[b] ? leavesArcBy(step.bodies[b], step.pose_scale, 1) : 0;
+    const double leaves_m = apart_m > 0 && !bounds[b] ? leavesWayBy(step.bodies[b], step.pose_scale, 1) : 0;
     if (!bounds[b]) bounds[b] = sweptBounds(step, step.bodies[b], margin_m + leaves_m);
     return *bounds[b];
   };
@@ -98,13 +227,23 @@ std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<
     }
     return false;
   };
+  // What more parts need for another body may leave this one's bends where fewer met them.
+  const auto fits = [&](double parts) {
+    return std::all_of(step.bodies.begin(), step.bodies.end(), [&](const Body& body) {
+      return body.waypoints.empty() || !isNear(static_cast<std::size_t>(&body - step.bodies.data())) ||
+             leavesWayBy(body, 1, static_cast<std::size_t>(parts)) <= tolerance_m;
+    });
+  };
   double parts = 1;
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     const Body& body = step.bodies[b];
-    if (!body.turns) continue;
+    if (!body.turns || !body.waypoints.empty()) continue;
     const double own =
         partsFor(body, step.pose_scale, tolerance_m, b < before.size() ? &before[b].extents[1] : nullptr);
     if (own > parts && isNear(b)) parts = own;
+  }
+  for (; !fits(parts); ++parts) {
+    if (parts >= MOST_PARTS_FOR_WAYPOINTS) return NO_NUMBER_OF_PARTS;
   }
   return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
 }
@@ -115,28 +254,19 @@ void advance(const Step& step, std::size_t part, std::size_t parts, Step& at) {
     const Body& body = step.bodies[b];
     Body& moved = at.bodies[b];
     moved.t0 = moved.t1;
-    if (part == parts) {
-      moved.t1 = body.t1;
-      continue;
-    }
-    auto end = std::make_shared<Positions>();
-    if (body.turns) {
-      const Eigen::Isometry3d motion = movedBy(step, body, u);
-      end->resize(body.t0->size());
-      for (std::size_t v = 0; v < end->size(); ++v) (*end)[v] = motion * (*body.t0)[v];
-    } else {
-      interpolate(*body.t0, *body.t1, u, *end);
-    }
-    moved.t1 = std::move(end);
+    moved.t1 = part == parts ? body.t1 : share(placedAt(step.pose_scale, body, u));
   }
 }
 
 Vec3 placeVertex(const Step& step, std::size_t b, Index vertex, std::size_t part, std::size_t parts) {
   const Body& body = step.bodies[b];
-  const Vec3 &from = (*body.t0)[vertex], &to = (*body.t1)[vertex];
-  if (part == 0 || part == parts) return part == 0 ? from : to;
+  const Vec3 &t0 = (*body.t0)[vertex], &t1 = (*body.t1)[vertex];
+  if (part == 0 || part == parts) return part == 0 ? t0 : t1;
   const double u = static_cast<double>(part) / static_cast<double>(parts);
-  return body.turns ? Vec3(movedBy(step, body, u) * from) : Vec3(from + u * (to - from));
+  if (body.turns) return movedBy(step.pose_scale, body, u) * t0;
+  const Leg leg = legAt(body, u);
+  const Vec3 &from = (*leg.from)[vertex], &to = (*leg.to)[vertex];
+  return leg.u == 0 ? from : leg.u == 1 ? to : Vec3(from + leg.u * (to - from));
 }
 
 }  // namespace dccd

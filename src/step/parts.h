@@ -1,6 +1,8 @@
-// A step whose bodies turn, as parts that are straight enough.
+// A step whose bodies turn or have waypoints, as parts that are straight enough.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "culling/scene_arrays.h"
@@ -12,13 +14,23 @@ namespace dccd {
 /// its arc [m]; not limited. extent: what spares a look at each vertex, if it is of t0; null: none.
 double partsFor(const Body& body, double pose_scale, double tolerance_m, const Extent* extent = nullptr);
 
-/// How far the turning body's straight vertex paths leave its arc at most when the step is cut into so many parts [m],
-/// what placing them rounds included; 0 of one that does not turn.
-double leavesArcBy(const Body& body, double pose_scale, double parts);
+/// How far the body's straight vertex paths leave its way at most when the step is cut into so many equal parts [m],
+/// what placing them rounds included; 0 of one that goes straight.
+double leavesWayBy(const Body& body, double pose_scale, std::size_t parts);
 
-/// The most that a body needs, up to 1e9; 1 where nothing turns. One does not count where neither its arcs nor its
-/// straight paths come near anything that it is tested against or, with apart_m, from which its distance is asked for
-/// up to there. before: the bodies as a step before left them.
+/// How far the waypoints are from the way that the body takes without them [m].
+double offWay(const Body& body, const std::vector<Waypoint>& waypoints);
+
+/// Of a step with a body that so many equal parts, or fewer, do not keep near its waypoints.
+constexpr std::size_t NO_NUMBER_OF_PARTS = std::numeric_limits<std::size_t>::max();
+/// The parts that a step is cut into where so many are needed. Where no number is enough it is not cut in vain.
+inline std::size_t partsAllowed(std::size_t needed, std::size_t most) {
+  return needed == NO_NUMBER_OF_PARTS ? 1 : std::min(needed, most);
+}
+
+/// The most that a body needs, up to 1e9, or NO_NUMBER_OF_PARTS; 1 where each goes straight. One does not count where
+/// neither its arcs nor its straight paths come near anything that it is tested against or, with apart_m, from which
+/// its distance is asked for up to there. before: the bodies as a step before left them.
 std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before = {},
                         double apart_m = 0);
 

@@ -95,10 +95,12 @@ struct Monitor::Impl {
   /// Where the body's run is another one than outcomes have told of, the step is one of seam, once.
   void dropAtSeam(std::size_t body, Pending& step);
   Step place(const Pending& pending);
-  /// What of the body's way contradicts the step's, or is not known: its frames between the step's ends; what carries
-  /// it from one frame to the next; what of it came between the stamps and was not used.
+  static void sayUnknown(const std::string& name, const std::string& why, Step& step);
   void lookBetween(std::size_t body, Step& step) const;
-  void lookAtCarrier(std::size_t body, const MeshFrame& from, const MeshFrame& to, Step& step) const;
+  std::vector<Knot> trackOf(const MeshFrame& from, const MeshFrame& to, std::string& why) const;
+  /// The body's waypoints; stretches: its frames in and around the step, oldest first.
+  void follow(std::size_t body, const std::vector<MeshStore::Stretch>& stretches, Step& step) const;
+  /// Says of the step what came of the body between the stamps and was not used.
   void lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const;
   /// The same of what is held where it was placed once: static bodies and the map. epoch: of the step's first frame.
   void lookAtHeld(std::uint64_t epoch, Step& step) const;

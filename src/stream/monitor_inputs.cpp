@@ -3,6 +3,7 @@
 #include <sstream>
 #include <utility>
 
+#include "step/parts.h"
 #include "stream/monitor_impl.h"
 #include "stream/radii.h"
 
@@ -19,19 +20,6 @@ std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
 
 double largest(const std::vector<double>& values) {
   return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
-}
-
-/// How far the frame is from the path that the body takes, at this time of the step: straight or, of one that turns,
-/// along the shorter arc [m].
-double offPath(const MeshFrame& frame, const Body& body, double u) {
-  const Eigen::Isometry3d moved = interpolate(body.pose_t0, body.pose_t1, u) * body.pose_t0.inverse();
-  double off = 0;
-  for (std::size_t v = 0; v < frame.positions.size(); ++v) {
-    const Vec3 &t0 = (*body.t0)[v], &t1 = (*body.t1)[v];
-    const Vec3 on_path = body.turns ? Vec3(moved * t0) : Vec3(t0 + u * (t1 - t0));
-    off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared
-  }
-  return off;
 }
 
 double fractionOf(const Step& step, StampNs stamp_ns) {
@@ -67,42 +55,21 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
   return bounds;
 }
 
-/// How far a rigid body leaves the path of the step on that of what carries it, of which the knots begin where the body
-/// is in this frame [m].
-double offArc(const std::vector<Knot>& knots, const MeshFrame& from, const Body& body, const Step& step) {
-  const Eigen::Isometry3d carrier_from_t0 = knots.front().pose.inverse() * from.pose * body.pose_t0.inverse();
-  const Eigen::AlignedBox3d bounds = boundsOf(body);
-  double off = 0;
-  for (const Knot& knot : knots) {
-    if (knot.stamp_ns < step.start_ns || knot.stamp_ns > step.stamp_ns) continue;
-    const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionOf(step, knot.stamp_ns));
-    off = std::max(off, apart(knot.pose * carrier_from_t0, on_path * body.pose_t0.inverse(), bounds));
-  }
-  return off;
+/// Where vertices are at a knot between two frames, on the way of what carries them, on which they go straight. `first`
+/// and `last` are its poses at the two.
+Positions carriedTo(const Knot& knot, const Knot& first, const Knot& last, const Positions& from, const Positions& to) {
+  const double u =
+      static_cast<double>(knot.stamp_ns - first.stamp_ns) / static_cast<double>(last.stamp_ns - first.stamp_ns);
+  const Eigen::Isometry3d from_first = knot.pose * first.pose.inverse(), from_last = knot.pose * last.pose.inverse();
+  Positions carried(from.size());
+  for (std::size_t v = 0; v < from.size(); ++v) carried[v] = (1 - u) * (from_first * from[v]) + u * (from_last * to[v]);
+  return carried;
 }
 
-/// How far vertices leave the straight way between two frames on that of what carries them, of which the knots are
-/// [m].
-double offChord(const std::vector<Knot>& knots, const MeshFrame& from, const MeshFrame& to) {
-  const Eigen::Isometry3d &from_pose = knots.front().pose, &to_pose = knots.back().pose;
-  const Eigen::Isometry3d from_back = from_pose.inverse(), to_back = to_pose.inverse();
-  double off = 0;
-  for (const Knot& knot : knots) {
-    // A frame that stands still, as a camera's on its mount, costs no look at the vertices.
-    if (knot.pose.isApprox(to_pose, STILL) && from_pose.isApprox(to_pose, STILL)) continue;
-    const double u =
-        static_cast<double>(knot.stamp_ns - from.stamp_ns) / static_cast<double>(to.stamp_ns - from.stamp_ns);
-    for (std::size_t v = 0; v < to.positions.size(); ++v) {
-      const Vec3 &t0 = from.positions[v], &t1 = to.positions[v];
-      const Vec3 carried = knot.pose * ((1 - u) * (from_back * t0) + u * (to_back * t1));
-      off = std::max(off, (carried - ((1 - u) * t0 + u * t1)).norm());
-    }
-  }
-  return off;
-}
-
-std::string unknown(const std::string& name, const std::string& why) {
-  return "where " + name + " was is not known for all of this step" + (why.empty() ? "" : " (" + why + ")");
+/// A frame that stands still, as a camera's on its mount, costs no look at the vertices.
+bool standsStill(const std::vector<Knot>& knots) {
+  return std::all_of(knots.begin(), knots.end(),
+                     [&](const Knot& knot) { return knot.pose.isApprox(knots.front().pose, STILL); });
 }
 
 /// Has the frame lost a vertex that is to be looked at?
@@ -117,6 +84,10 @@ bool hasLost(const MeshFrame& frame, const Body& body) {
 void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
 
 }  // namespace
+
+void Monitor::Impl::sayUnknown(const std::string& name, const std::string& why, Step& step) {
+  addSentence(step.off_path, "where " + name + " was is not known for all of this step (" + why + ")");
+}
 
 void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to,
                   Body& body) {
@@ -170,67 +141,67 @@ void Monitor::Impl::dropAtSeam(std::size_t body, Pending& step) {
   drop(step, reason, "body '" + bodies[body].name + "' began anew since the last step (" + toString(reason) + ")");
 }
 
-/// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the
-/// other. What was seen of it in between must not be contradicted in silence: where it was, how uncertain, and what was
-/// missing of it.
+/// What was seen of the body between the step's ends must not be contradicted in silence: how uncertain it was, and
+/// what was missing of it.
 void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   Body& body = step.bodies[b];
-  const auto frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
-  double off_m = 0;
   bool lost = false;
-  for (const std::shared_ptr<const MeshFrame>& frame : frames) {
+  for (const std::shared_ptr<const MeshFrame>& frame : stores[b].framesWithin(step.start_ns, step.stamp_ns)) {
     lost = lost || hasLost(*frame, body);
-    off_m = std::max(off_m, offPath(*frame, body, fractionOf(step, frame->stamp_ns)));
     if (!frame->radius_m.empty()) {
       body.radius_m = radii(largerRadii(body.radius_m ? *body.radius_m : std::vector<double>(), frame->radius_m));
     }
     body.dropped_faces = std::max(body.dropped_faces, frame->dropped_faces);
   }
   if (lost) {
-    addSentence(step.off_path, unknown("body '" + body.name + "'", "a frame between its ends has lost vertices"));
-  }
-  if (off_m > options.detector.rigid_tolerance_m) {
-    std::ostringstream text;
-    text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in "
-         << frames.size() << " frames between its ends; make it the clock_body";
-    addSentence(step.off_path, text.str());
-  }
-  for (const MeshStore::Stretch& stretch : stores[b].pathWithin(step.start_ns + 1, step.stamp_ns - 1)) {
-    lookAtCarrier(b, *stretch.from, *stretch.to, step);
+    sayUnknown("body '" + body.name + "'", "a frame between its ends has lost vertices", step);
   }
 }
 
-/// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it. A
-/// step takes them straight in the fixed frame; a rigid body along its arc from the step's one end to the other.
-void Monitor::Impl::lookAtCarrier(std::size_t b, const MeshFrame& from, const MeshFrame& to, Step& step) const {
-  const Body& body = step.bodies[b];
-  const auto say = [&](const std::string& why) {
-    addSentence(step.off_path, unknown("body '" + body.name + "'", why));
+/// The track of what carries a body from one of its frames to the next. Empty: it stands still, or `why` says why it is
+/// not known.
+std::vector<Knot> Monitor::Impl::trackOf(const MeshFrame& from, const MeshFrame& to, std::string& why) const {
+  if (!tracks || (from.carrier.frame.empty() && to.carrier.frame.empty())) return {};
+  if (from.carrier.frame != to.carrier.frame) why = "the frame that carries it is another one than before";
+  if (from.carrier.epoch != tracks->epoch() || to.carrier.epoch != tracks->epoch()) why = FORGOTTEN;
+  if (!why.empty()) return {};
+  std::vector<Knot> knots = tracks->between({}, to.carrier.frame, from.stamp_ns, to.stamp_ns, to.carrier.silence);
+  const auto unknown = std::find_if(knots.begin(), knots.end(), [](const Knot& k) { return !k.why_unknown.empty(); });
+  if (unknown != knots.end()) why = unknown->why_unknown;
+  return why.empty() ? knots : std::vector<Knot>();
+}
+
+/// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it; a
+/// rigid body is carried as it is. Where that leaves the way from the step's start to its end, it becomes waypoints.
+void Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>& stretches, Step& step) const {
+  Body& body = step.bodies[b];
+  std::vector<Waypoint> waypoints;
+  const auto add = [&](StampNs stamp_ns, const Eigen::Isometry3d& pose, std::shared_ptr<const Positions> positions) {
+    waypoints.push_back({fractionOf(step, stamp_ns), pose, body.turns ? nullptr : std::move(positions)});
   };
-  if (!tracks || (from.carrier.frame.empty() && to.carrier.frame.empty())) return;
-  if (from.carrier.frame != to.carrier.frame) return say("the frame that carries it is another one than before");
-  if (from.carrier.epoch != tracks->epoch() || to.carrier.epoch != tracks->epoch()) return say(FORGOTTEN);
-  const std::vector<Knot> knots = tracks->between({}, to.carrier.frame, from.stamp_ns, to.stamp_ns, to.carrier.silence);
-  const auto why = std::find_if(knots.begin(), knots.end(), [](const Knot& knot) { return !knot.why_unknown.empty(); });
-  if (why != knots.end()) return say(why->why_unknown);
-  if (knots.empty() || from.stamp_ns == to.stamp_ns) return;
-  const double off_m = to.rigid ? offArc(knots, from, body, step) : offChord(knots, from, to);
-  if (off_m <= options.detector.rigid_tolerance_m) return;
-  std::ostringstream text;
-  if (!to.rigid) {
-    text << "between two of its frames tf has its frame '" << to.carrier.frame << "' up to " << off_m
-         << " m off the straight way; send its mesh more often, or in the fixed frame";
-    return say(text.str());
+  const auto isWithin = [&](StampNs stamp_ns) { return stamp_ns > step.start_ns && stamp_ns < step.stamp_ns; };
+  for (const MeshStore::Stretch& stretch : stretches) {
+    const MeshFrame &from = *stretch.from, &to = *stretch.to;
+    std::string why;
+    const std::vector<Knot> knots = trackOf(from, to, why);
+    if (!why.empty()) {
+      sayUnknown("body '" + body.name + "'", why, step);
+      return;
+    }
+    for (std::size_t k = 1; k + 1 < knots.size() && !standsStill(knots); ++k) {
+      if (!isWithin(knots[k].stamp_ns)) continue;
+      add(knots[k].stamp_ns, knots[k].pose * knots.front().pose.inverse() * from.pose,
+          body.turns ? nullptr : share(carriedTo(knots[k], knots.front(), knots.back(), from.positions, to.positions)));
+    }
+    if (isWithin(to.stamp_ns)) add(to.stamp_ns, to.pose, {stretch.to, &to.positions});
   }
-  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in poses of tf "
-       << "between its ends; send the mesh of '" << bodies[options.clock_body].name << "' more often";
-  addSentence(step.off_path, text.str());
+  if (offWay(body, waypoints) > options.detector.rigid_tolerance_m) body.waypoints = std::move(waypoints);
 }
 
 /// What came and was not used may have had the body anywhere.
 void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const {
   const std::string why = stores[body].unknownWithin(from_ns, to_ns);
-  if (!why.empty()) addSentence(step.off_path, unknown("body '" + bodies[body].name + "'", why));
+  if (!why.empty()) sayUnknown("body '" + bodies[body].name + "'", why, step);
 }
 
 /// What tf says since they were placed must not be contradicted in silence.
@@ -242,7 +213,7 @@ void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Step& step) const {
     const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
     const std::string name =
         is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
-    const auto say = [&](const std::string& why) { addSentence(step.off_path, unknown(name, why)); };
+    const auto say = [&](const std::string& why) { sayUnknown(name, why, step); };
     if (frame && !frame->doubt.empty()) say(frame->doubt);
     if (!tracks || carrier.empty()) continue;
     const std::vector<Knot> knots =
@@ -295,10 +266,13 @@ Step Monitor::Impl::place(const Pending& pending) {
     }
     if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
       placeBetween(pending.from, pending.to, body);
-      lookAtCarrier(b, *pending.from, *pending.to, step);
+      follow(b, {{pending.from, pending.to, 0, 1}}, step);
     } else {
       placeBetween(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
       lookBetween(b, step);
+      auto stretches = stores[b].pathWithin(step.start_ns + 1, step.stamp_ns - 1);
+      std::reverse(stretches.begin(), stretches.end());
+      follow(b, stretches, step);
     }
     stores[b].forgetBefore(wayNeededFrom(b, step.stamp_ns));
   }

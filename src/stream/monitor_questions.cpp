@@ -39,7 +39,9 @@ Outcome Monitor::checkNow() {
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     if (!m.isStream(b)) continue;
     const MeshFrame& newest = m.stores[b].newest();
-    m.lookAtCarrier(b, newest, newest, step);
+    std::string why;
+    m.trackOf(newest, newest, why);
+    if (!why.empty()) m.sayUnknown("body '" + m.bodies[b].name + "'", why, step);
     m.lookForUnused(b, newest.stamp_ns, std::numeric_limits<StampNs>::max(), step);  // what came after it
   }
   m.side_history.clear();
@@ -79,6 +81,7 @@ Outcome Monitor::predict() {
     } else {
       for (std::size_t v = 0; v < to.size(); ++v) to[v] = now[v] + ahead * (now[v] - before[v]);
     }
+    body.waypoints.clear();
     body.t0 = body.t1;
     body.t1 = share(std::move(to));
   }

@@ -28,7 +28,7 @@ void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Op
   step_ = &step;
   options_ = options.clearance;
   rigid_tolerance_m_ = options.rigid_tolerance_m;
-  needed_ = std::min(neededParts(step, rigid_tolerance_m_, scene.bodies(), options_.max_m), options.max_substeps);
+  needed_ = partsAllowed(neededParts(step, rigid_tolerance_m_, scene.bodies(), options_.max_m), options.max_substeps);
   stretches_ = 1;
   exact_ = options.accuracy.rung == Accuracy::EXACT;
   const std::size_t n = step.bodies.size();
