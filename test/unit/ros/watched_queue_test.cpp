@@ -43,8 +43,8 @@ class Topic {
   int taken() const { return taken_; }
   int lacking() const { return lacking_; }
 
-  /// Comes while the callback runs, after it has looked.
-  int meanwhile = 0;
+  /// What comes while the callback runs, before and after it looks.
+  int before_look = 0, after_look = 0;
 
  private:
   WatchedQueue& callbacks_;
@@ -54,12 +54,13 @@ class Topic {
   int came_ = 0, last_ = -1, dropped_ = 0, taken_ = 0, lacking_ = 0;
 
   void take(int number) {
+    for (; before_look > 0; --before_look) come();
     const bool may_lack = watch_.mayLack(callbacks_);
     EXPECT_TRUE(may_lack || number == last_ + 1) << number << " follows " << last_;
     lacking_ += may_lack;
     last_ = number;
     ++taken_;
-    for (; meanwhile > 0; --meanwhile) come();
+    for (; after_look > 0; --after_look) come();
   }
 };
 
@@ -89,7 +90,9 @@ TEST_F(WatchedQueueTest, WhatFollowsADroppedOneLacksIt) {
     for (int k = 0; k < 30; ++k) {
       Topic& one = random() % 4 == 0 ? other : topic;
       for (auto n = random() % (ROOM + 2); n > 0; --n) one.come();
-      one.meanwhile = random() % 3 == 0 ? static_cast<int>(random() % (ROOM + 3)) : 0;
+      for (int* some : {&one.before_look, &one.after_look}) {
+        *some = random() % 3 == 0 ? static_cast<int>(random() % (ROOM + 3)) : 0;
+      }
       for (auto n = random() % (ROOM + 2); n > 0; --n) callbacks.callOne();
     }
     while (callbacks.callOne() == ros::CallbackQueue::Called) {
