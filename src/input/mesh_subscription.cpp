@@ -10,6 +10,7 @@
 #include "input/master_question.h"
 #include "input/message_bytes.h"
 #include "input/steady_clock.h"
+#include "input/watched_queue.h"
 
 namespace dccd {
 
@@ -17,7 +18,6 @@ namespace {
 
 using topic_tools::ShapeShifter;
 
-constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 // A topic that has been quiet so long may have lost its publisher. Asked about so often, and at once when the last
 // publisher has gone.
 constexpr std::int64_t SILENCE_NS = 1000000000, LOOK_NS = 500000000, LOST_LOOK_NS = 200000000;

@@ -15,7 +15,6 @@ namespace {
 
 using topic_tools::ShapeShifter;
 
-constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 // Of the second in which the process is to end.
 constexpr std::chrono::milliseconds END_AFTER{700};
 
@@ -75,7 +74,9 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       diagnostics(private_node.getNamespace()),
       diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),
       log(node, private_node.getNamespace(), config),
-      disabled_frames(config.bodies.size()) {
+      disabled_frames(config.bodies.size()),
+      mesh_drops(config.bodies.size()),
+      mesh_lacks(config.bodies.size()) {
   // Of a static body the newest frame alone counts.
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (pipeline.isStatic(b)) queue.keepNewest(b);
@@ -87,6 +88,8 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
   frames_handed_over += message.object.handed_over;
+  if (mesh_drops[body].mayLack(input_callbacks)) ++mesh_lacks[body];
+  message.number += mesh_lacks[body];  // a number that is missing
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
   // voxels are followed by where the bodies were.
   if (!enabled && !pipeline.isStatic(body) && !config.ownsVoxels()) {
@@ -101,6 +104,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 }
 
 void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
+  if (tf_drops[is_static].mayLack(input_callbacks)) feed.lose(is_static);
   const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(*event.getConstMessage()));
   if (message) feed.add(*message, is_static, event.getPublisherName());
   for (const std::string& line : feed.takeProblems()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);

@@ -5,6 +5,7 @@
 
 #include "output/outputs.h"
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <map>
@@ -20,6 +21,7 @@
 #include "input/raw_message.h"
 #include "input/steady_clock.h"
 #include "input/transforms.h"
+#include "input/watched_queue.h"
 #include "node/collision_monitor.h"
 #include "node/input_queue.h"
 #include "node/map_loader.h"
@@ -51,7 +53,8 @@ struct CollisionMonitor::Impl {
   MonitorLog log;
   std::unique_ptr<MapLoader> maps;
 
-  ros::CallbackQueue input_callbacks, service_callbacks;
+  WatchedQueue input_callbacks;
+  ros::CallbackQueue service_callbacks;
   ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
   std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
   std::vector<ros::Subscriber> map_subscribers;                    // of the octomap, or one for each source of clouds
@@ -65,9 +68,13 @@ struct CollisionMonitor::Impl {
   std::atomic<std::uint64_t> frames_handed_over{0}, requests_refused{0};
   std::thread worker;
   std::vector<std::atomic<std::uint64_t>> disabled_frames;  // that came while disabled, not yet counted
-  bool plan_unsaid = false;                                 // the worker's
-  StampNs newest_ns = 0;                                    // stamp of the last outcome; the worker's
-  std::uint64_t steps_unpublished = 0;                      // the worker's, too
+  // Of what roscpp may have dropped; the input thread's.
+  std::vector<DropWatch> mesh_drops;
+  std::array<DropWatch, 2> tf_drops;      // of /tf, of /tf_static
+  std::vector<std::uint64_t> mesh_lacks;  // by body, messages that are taken for missing
+  bool plan_unsaid = false;               // the worker's
+  StampNs newest_ns = 0;                  // stamp of the last outcome; the worker's
+  std::uint64_t steps_unpublished = 0;    // the worker's, too
 
   /// What came of a body's topic by when; the worker's, as what follows.
   struct Heard {
