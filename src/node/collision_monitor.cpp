@@ -99,6 +99,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   if (body == config.monitor.clock_body && enabled) state.frameCame(now_ns);
   message.receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   message.arrival_ns = now_ns;
+  message.since_ns = waiting_clock.now();
   queue.push(body, std::move(message));
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
@@ -173,7 +174,7 @@ void CollisionMonitor::Impl::subscribe() {
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });
   if (config.takesMapFileAlone()) return maps->submitFile(config.octomap_file, steadyNs());
-  if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), steadyNs());
+  if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), waiting_clock.now());
   for (const std::string& topic : config.liveMapNames()) {
     const std::size_t source = map_subscribers.size();
     ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on

@@ -83,7 +83,8 @@ struct CollisionMonitor::Impl {
   };
   std::vector<Heard> heard;
   WatchClock silence_clock;
-  std::size_t fallen_silent = 0;  // topics that were heard before
+  WatchClock waiting_clock{true};  // of frames and maps that wait for others
+  std::size_t fallen_silent = 0;   // topics that were heard before
 
   Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle, MonitorConfig given);
 

@@ -19,6 +19,7 @@ void InputQueue::push(std::size_t body, MeshMessage message) {
       emptied.too_large = message.size();
       emptied.receipt_ns = message.receipt_ns;
       emptied.arrival_ns = message.arrival_ns;
+      emptied.since_ns = message.since_ns;
       message = std::move(emptied);
     }
     const std::size_t size = message.size();

@@ -63,6 +63,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   came_[body] = message.number > 0 ? message.number : came_[body] + 1;
   finishing_ = false;
   Waiting waiting;
+  waiting.since_ns = message.since_ns < 0 ? message.arrival_ns : message.since_ns;
   const auto refuse = [&](StepStatus status, const std::string& reason) {
     monitor_->countReceived(body);
     skip(body, status, message.receipt_ns, message.arrival_ns, reason);

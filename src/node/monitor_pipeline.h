@@ -140,6 +140,7 @@ class MonitorPipeline {
  private:
   struct Waiting {
     DecodedMesh mesh;
+    std::int64_t since_ns = 0;
     bool overdue = false;  // past transform_timeout_s
     bool kept = false;     // that, or one before it was: a static body sends its only frame once, and steps do not wait
     bool told = false;     // the problem about it has been set

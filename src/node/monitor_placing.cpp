@@ -152,7 +152,7 @@ void MonitorPipeline::widen(std::size_t body, MeshFrame& frame) {
 bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
   const std::uint64_t epoch = tracks_.epoch();  // before tf is asked: what is forgotten since is told from it
-  const bool overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
+  const bool overdue = finishing_ || secondsBetween(waiting.since_ns, now_ns) >= config_.transform_timeout_s;
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   StepStatus problem = StepStatus::NO_TRANSFORM;
   Eigen::Isometry3d fixed_from_mesh;

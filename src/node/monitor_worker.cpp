@@ -71,7 +71,7 @@ void CollisionMonitor::Impl::takeMaps() {
       log.complain(config.bodies.size(), "map", "refused: " + map.problem);
       map.problem = whyRefused(map.problem, config);
     }
-    pipeline.setMap(std::move(map), steadyNs());
+    pipeline.setMap(std::move(map), waiting_clock.now());
   }
 }
 
@@ -286,7 +286,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   accountDropped();
   if (holdsStaticFrames()) state.staticInUse(static_frames);
   Outcome outcome;
-  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) {
+  while (!stopping && pipeline.nextOutcome(waiting_clock.now(), outcome)) {
     if (!pipeline.isResting()) publishOutcome(outcome);
   }
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <new>
 #include <utility>
 
@@ -23,6 +24,7 @@ constexpr std::int64_t LONGEST_STAND_NS = 10'000'000'000;
 }  // namespace
 
 std::int64_t WatchClock::now() {
+  const std::lock_guard<std::mutex> lock(mutex_);
   const std::int64_t steady_ns = steadyNs(), ros_ns = static_cast<std::int64_t>(ros::Time::now().toNSec());
   // Before the first /clock the time is 0. There may never be one, and true time passes until then.
   const bool simulated = ros::Time::isSimTime() && ros_ns > 0;
@@ -30,7 +32,9 @@ std::int64_t WatchClock::now() {
   const bool begins = simulated != std::exchange(simulated_, simulated) || last_ns_ == 0;
   if (begins || now_ns != last_ns_) {
     const std::int64_t true_ns = steady_ns - std::exchange(changed_ns_, steady_ns);
-    if (!begins) elapsed_ns_ += now_ns > last_ns_ ? now_ns - last_ns_ : std::min(last_ns_ - now_ns, true_ns);
+    const bool is_limited = no_faster_ || now_ns < last_ns_;
+    const std::int64_t gone_ns = std::abs(now_ns - last_ns_);
+    if (!begins) elapsed_ns_ += is_limited ? std::min(gone_ns, true_ns) : gone_ns;
     last_ns_ = now_ns;
   } else if (const std::int64_t beyond_ns = steady_ns - changed_ns_ - LONGEST_STAND_NS; beyond_ns > 0) {
     elapsed_ns_ += beyond_ns;

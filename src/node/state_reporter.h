@@ -21,14 +21,19 @@
 
 namespace dccd {
 
-/// Runs with the steady clock; with /use_sim_time, from the first /clock on, with that, at its rate, and stands while
-/// that stands, for ten seconds. While /clock goes back true time passes, as much as it goes back at the most: a clock
-/// that runs backwards hides no silence, and one that jumps back, as of a bag in a loop, takes nothing away.
+/// Safe to call from any thread. Runs with the steady clock; with /use_sim_time, from the first /clock on, with that,
+/// at its rate, and stands while that stands, for ten seconds. While /clock goes back true time passes, as much as it
+/// goes back at the most: a clock that runs backwards hides no silence, and one that jumps back, as of a bag in a loop,
+/// takes nothing away.
 class WatchClock {
  public:
+  /// no_faster: than true time, for what waits for other computers' messages.
+  explicit WatchClock(bool no_faster = false) : no_faster_(no_faster) {}
   std::int64_t now();
 
  private:
+  const bool no_faster_;
+  std::mutex mutex_;
   bool simulated_ = false;
   std::int64_t last_ns_ = 0, changed_ns_ = 0, elapsed_ns_ = 0;  // changed: on the steady clock
 };

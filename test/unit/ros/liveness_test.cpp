@@ -162,10 +162,10 @@ TEST(Liveness, AStreamOfStaticFramesHasItsTime) {
 }
 
 /// /clock goes by `simulated`, a step of it each 5 ms of true time; how far the watch went [s].
-double watchedOver(int steps, double step_s) {
+double watchedOver(int steps, double step_s, bool no_faster = false) {
   ros::Time::init();
   ros::Time::setNow(ros::Time(10000));
-  WatchClock watch;
+  WatchClock watch(no_faster);
   const std::int64_t begin_ns = watch.now();
   for (int k = 1; k <= steps; ++k) {
     ros::Time::setNow(ros::Time(10000 + k * step_s));
@@ -185,6 +185,14 @@ TEST(WatchClockTest, TimeThatRunsBackwardsPasses) {
   const double backwards_s = watchedOver(20, -1);
   EXPECT_GE(backwards_s, 0.1) << "true time has passed";
   EXPECT_LT(backwards_s, 20) << "a jump back is no long silence";
+}
+
+// A simulation at a third of true time is waited for by its clock; what is played ten times as fast by true time.
+TEST(WatchClockTest, WhatWaitsGoesByTheSlowerClock) {
+  EXPECT_NEAR(watchedOver(20, 0.001, true), 0.02, 1e-6);
+  const double fast_s = watchedOver(20, 1, true);
+  EXPECT_GE(fast_s, 0.1) << "true time has passed";
+  EXPECT_LT(fast_s, 5);
 }
 
 // /use_sim_time, and nobody who sends /clock: there is nothing else to go by.

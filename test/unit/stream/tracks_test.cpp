@@ -1,0 +1,183 @@
+// What carries bodies and the map: a step asks where it went, and is no proof where nobody knows.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+
+#include "dccd/assurance.h"
+#include "unit/stream/monitor_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+/// Frames that go as the test has them, with a knot each 10 ms.
+struct Said : FrameTracks {
+  std::map<std::string, std::function<Eigen::Isometry3d(double)>> fixed_from;  ///< at a time [s]
+  std::map<std::string, StampNs> unknown_at;
+  std::uint64_t now = 1;
+
+  Eigen::Isometry3d poseOf(const std::string& frame, StampNs stamp_ns) const {
+    if (frame.empty()) return Eigen::Isometry3d::Identity();
+    return fixed_from.at(frame)(1e-9 * static_cast<double>(stamp_ns));
+  }
+  std::vector<Knot> between(const std::string& target, const std::string& source, StampNs from_ns, StampNs to_ns,
+                            Silence) const override {
+    std::vector<Knot> knots;
+    if (target == source) return knots;
+    for (StampNs at = from_ns; at < to_ns; at += 10 * MS) knots.push_back({at});
+    knots.push_back({to_ns});
+    for (Knot& knot : knots) {
+      knot.pose = poseOf(target, knot.stamp_ns).inverse() * poseOf(source, knot.stamp_ns);
+      for (const auto& [frame, stamp_ns] : unknown_at) {
+        if ((frame == source || frame == target) && stamp_ns == knot.stamp_ns) knot.why_unknown = "nobody saw " + frame;
+      }
+    }
+    return knots;
+  }
+  std::uint64_t epoch() const override { return now; }
+};
+
+/// A floor at rest, which is the clock, and a tip 1 m above it, rigid or not, in the frame 'hand'.
+struct Tracks : testing::Test {
+  Said said;
+  bool rigid = false;
+
+  void SetUp() override {
+    said.fixed_from["hand"] = [](double) { return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1)); };
+  }
+  MeshFrame held(StampNs stamp_ns, const std::string& frame = "hand") const {
+    MeshFrame mesh = tip(stamp_ns, 0);
+    mesh.rigid = rigid;
+    mesh.pose = said.poseOf(frame, stamp_ns);
+    for (Vec3& p : mesh.positions) p = mesh.pose * p;
+    mesh.carrier = {frame, said.now};
+    return mesh;
+  }
+  MeshFrame clock(StampNs stamp_ns) const {
+    MeshFrame mesh = floor(stamp_ns, 0);
+    mesh.carrier.epoch = said.now;
+    return mesh;
+  }
+  /// The answer to the step of 100 ms that ends at 200 ms; `meanwhile` comes before it is asked for.
+  Outcome last(const std::function<void(Monitor&)>& meanwhile = [](Monitor&) {}) {
+    std::vector<Body> bodies{named("floor"), named("tip")};
+    bodies[1].rigid = rigid;
+    Monitor monitor(loose(), bodies);
+    monitor.setTracks(&said);
+    for (const StampNs stamp_ns : {100 * MS, 200 * MS}) {
+      monitor.push(1, held(stamp_ns), NOW);
+      monitor.push(0, clock(stamp_ns), NOW);
+      if (stamp_ns == 200 * MS) meanwhile(monitor);
+      Outcome outcome;
+      EXPECT_TRUE(monitor.next(NOW, outcome));
+      if (stamp_ns == 200 * MS) return outcome;
+    }
+    return {};
+  }
+  static void expectDoubt(const Outcome& outcome, const std::string& why) {
+    EXPECT_EQ(outcome.status, StepStatus::PARTIAL);
+    EXPECT_FALSE(assuranceOf(outcome).proved);
+    EXPECT_NE(outcome.reason.find(why), std::string::npos) << outcome.reason;
+  }
+};
+
+TEST_F(Tracks, WhatIsCarriedAtRestIsClear) {
+  for (const bool is_rigid : {false, true}) {
+    rigid = is_rigid;
+    EXPECT_TRUE(assuranceOf(last()).clear());
+  }
+}
+
+// The hand dips and comes back between two frames; what it carries is through the floor for a while, or stays above.
+TEST_F(Tracks, WhatIsCarriedGoesAsItsFrameDoes) {
+  for (const bool is_rigid : {false, true}) {
+    rigid = is_rigid;
+    for (const double depth : {0.9, 1.1}) {
+      said.fixed_from["hand"] = [depth](double t) {
+        const double z = 1 - depth * std::pow(std::sin(M_PI * (t - 0.1) / 0.1), 2);
+        return Eigen::Isometry3d(Eigen::Translation3d(0, 0, z));
+      };
+      const Outcome outcome = last();
+      ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+      EXPECT_EQ(assuranceOf(outcome).clear(), depth < 1);
+      if (depth < 1) continue;
+      EXPECT_NEAR(outcome.earliest_toc, std::asin(std::sqrt(1 / depth)) / M_PI, 0.02);
+    }
+  }
+}
+
+TEST_F(Tracks, WhereNobodyKnowsThatIsNoProof) {
+  for (const bool is_rigid : {false, true}) {
+    rigid = is_rigid;
+    for (const StampNs at : {100, 150, 200}) {
+      said.unknown_at["hand"] = at * MS;
+      expectDoubt(last(), "where body 'tip' was is not known for all of this step (nobody saw hand)");
+    }
+    said.unknown_at.clear();
+  }
+}
+
+// Two frames of the mesh by two frames of reference that are at one place: how it went from the one to the other nobody
+// says.
+TEST_F(Tracks, AnotherFrameThatCarriesItIsNoProof) {
+  said.fixed_from["other"] = said.fixed_from["hand"];
+  for (const std::string& other : {std::string("other"), std::string()}) {
+    Monitor monitor(loose(), {named("floor"), named("tip")});
+    monitor.setTracks(&said);
+    MeshFrame second = held(200 * MS);
+    second.carrier.frame = other;
+    monitor.push(1, held(100 * MS), NOW);
+    monitor.push(0, clock(100 * MS), NOW);
+    only(monitor);
+    monitor.push(1, second, NOW);
+    monitor.push(0, clock(200 * MS), NOW);
+    expectDoubt(only(monitor), "the frame that carries it is another one than before");
+  }
+}
+
+// What is forgotten after the frames were placed, and before the step is answered, may be what they were placed by.
+TEST_F(Tracks, WhatIsForgottenBeforeTheAnswerIsNoProof) {
+  const auto forget = [&](Monitor&) { ++said.now; };
+  expectDoubt(last(forget), "stamps of tf went back");
+  said.fixed_from["odom"] = [](double) { return Eigen::Isometry3d::Identity(); };
+  std::vector<Body> bodies{named("floor")};
+  for (const bool forgets : {false, true}) {
+    Monitor monitor(loose(), bodies);
+    monitor.setTracks(&said);
+    monitor.setMap({VoxelSurface::build(0.1, {{{32768, 32768, 32758}, 1}}), 0, Eigen::Isometry3d::Identity(), "odom"});
+    monitor.push(0, clock(100 * MS), NOW);
+    only(monitor);
+    monitor.push(0, clock(200 * MS), NOW);
+    if (forgets) ++said.now;
+    const Outcome outcome = only(monitor);
+    if (forgets) {
+      expectDoubt(outcome, "the octomap's frame 'odom'");
+    } else {
+      EXPECT_TRUE(assuranceOf(outcome).clear()) << outcome.reason;
+    }
+  }
+}
+
+TEST_F(Tracks, AMapWhoseFrameGoesIsNoProof) {
+  for (const double speed : {0.0, 0.002, 0.5}) {  // of which the middle one stays within rigid_tolerance_m
+    said.fixed_from["odom"] = [speed](double t) { return Eigen::Isometry3d(Eigen::Translation3d(speed * t, 0, 0)); };
+    Monitor monitor(loose(), {named("floor")});
+    monitor.setTracks(&said);
+    monitor.setMap({VoxelSurface::build(0.1, {{{32768, 32768, 32758}, 1}}), 0, Eigen::Isometry3d::Identity(), "odom"});
+    monitor.push(0, clock(100 * MS), NOW);
+    only(monitor);
+    monitor.push(0, clock(200 * MS), NOW);
+    const Outcome outcome = only(monitor);
+    if (speed < 0.01) {
+      EXPECT_TRUE(assuranceOf(outcome).clear()) << outcome.reason;
+    } else {
+      expectDoubt(outcome, "m from where it was at its stamp; set fixed_frame to it");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
