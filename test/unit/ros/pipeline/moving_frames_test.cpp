@@ -222,6 +222,60 @@ TEST(RigidBodies, OfAStepThatIsLongerThanTfRemembersAreNoClearOne) {
   }
 }
 
+// Arms that turn in two joints, faster and slower, 0.3 m a link: at each rate of tf and of the cloth all of it is
+// proved.
+TEST(RigidBodies, OfAnArmThatSwingsAreProvedInEachStep) {
+  struct Rates {
+    double speed, tf_hz, cloth_hz;
+  };
+  for (const Rates& rates : {Rates{1, 500, 30}, Rates{1.5, 30, 10}, Rates{1.5, 100, 30}}) {
+    Moving scene(clothAndTip());
+    std::size_t proved = 0, steps = 0, in_parts = 0;
+    double told = -1;
+    for (int k = 0; k <= static_cast<int>(3 * rates.cloth_hz); ++k) {
+      const double at = k / rates.cloth_hz;
+      for (; told < at + 1.5 / rates.tf_hz; told += 1 / rates.tf_hz) {
+        if (told < 0) continue;
+        const double angle = rates.speed / 2 * std::sin(2 * told);
+        geometry_msgs::TransformStamped shoulder = above("shoulder", 0.8, after(told), angle),
+                                        elbow = above("elbow", 0, after(told), angle),
+                                        tip = above("tip", 0, after(told));
+        elbow.header.frame_id = "shoulder";
+        tip.header.frame_id = "elbow";
+        elbow.transform.translation.x = tip.transform.translation.x = 0.3;
+        scene.tell({shoulder, elbow, tip});
+      }
+      EXPECT_TRUE(scene.offer(at, 0));
+      if (k == 0) continue;
+      ++steps;
+      proved += assuranceOf(scene.outcome).clear();
+      in_parts += !scene.outcome.step->bodies[1].waypoints.empty();
+    }
+    EXPECT_EQ(proved, steps) << rates.tf_hz << " Hz, " << rates.cloth_hz << " Hz: " << scene.outcome.reason;
+    if (rates.cloth_hz < 20) EXPECT_GT(in_parts, 0u) << "else it shows nothing";
+  }
+}
+
+// Two trackers at 30 Hz, 15 ms apart, each with 1 mm of noise.
+TEST(Streams, OutOfPhaseAreProved) {
+  Moving scene(test::scene("effects: {octomap: 'off'}, bodies: {cloth: {topic: cloth}, towel: {topic: towel}}"));
+  std::size_t proved = 0, steps = 0, in_parts = 0;
+  for (int k = 0; k < 100; ++k) {
+    const auto noisy = [&](double z) { return static_cast<float>(z + 1e-3 * (k * 7919 % 17 / 8.0 - 1)); };
+    scene.take(1, cloudAt(after(0.033 * k - 0.018), noisy(0.3)));
+    scene.take(0, cloudAt(after(0.033 * k - 0.033), noisy(0)));
+    while (scene.pipeline.nextOutcome(0, scene.outcome)) {
+      if (!scene.outcome.answered) continue;
+      ++steps;
+      proved += assuranceOf(scene.outcome).clear();
+      in_parts += !scene.outcome.step->bodies[1].waypoints.empty();
+    }
+  }
+  EXPECT_GT(steps, 90u);
+  EXPECT_EQ(proved, steps) << scene.outcome.reason;
+  EXPECT_GT(in_parts, 0u) << "else it shows nothing";
+}
+
 struct Mapped : Moving {
   explicit Mapped(const XmlRpcValue& tree = scene()) : Moving(tree) {}
   void giveMapIn(const std::string& frame, double after_s, std::int64_t now_ns = 0) {
