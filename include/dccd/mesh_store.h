@@ -22,6 +22,7 @@ struct Knot {
   StampNs stamp_ns = 0;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::string why_unknown = {};  ///< in words; empty: it is known
+  bool is_middle = false;        ///< between two others, where the way does not bend all at once
 };
 
 /// What is said of a frame of reference at stamps at which nobody says where it is.
@@ -42,8 +43,8 @@ class DCCD_EXPORT FrameTracks {
  public:
   virtual ~FrameTracks() = default;
   /// The track of target_from_source from one stamp to another, both included: a knot at either, one wherever it may
-  /// bend, and one between any two of these, ascending. A knot says so where nobody knows. None at all: both are the
-  /// same frame.
+  /// bend all at once, and a middle between any two of these, ascending. A knot says so where nobody knows. None at
+  /// all: both are the same frame.
   virtual std::vector<Knot> between(const std::string& target, const std::string& source, StampNs from_ns,
                                     StampNs to_ns, Silence silence) const = 0;
   /// Another one once what was said before of where frames were may not hold any more.

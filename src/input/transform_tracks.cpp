@@ -43,8 +43,9 @@ std::string secondsOf(StampNs stamp_ns) {
 std::string noTransformAt(StampNs stamp_ns) { return "no transform of its frame at " + secondsOf(stamp_ns); }
 
 void TransformTracks::look(const std::string& target, const std::string& source, StampNs stamp_ns, Silence silence,
-                           std::vector<Knot>& knots) const {
+                           bool is_middle, std::vector<Knot>& knots) const {
   Knot knot{stamp_ns};
+  knot.is_middle = is_middle;
   std::string unused;
   if (transforms_.lookup(target, source, stamp_ns, knot.pose, unused)) {
     knots.push_back(std::move(knot));
@@ -68,12 +69,12 @@ std::vector<Knot> TransformTracks::between(const std::string& target_name, const
     return {unknownAt(to_ns, "more than " + std::to_string(tolerance::MOST_POSES_A_STEP) + " transforms")};
   }
   if (from_ns == to_ns) stamps.clear();
-  look(target, source, from_ns, silence, knots);
+  look(target, source, from_ns, silence, false, knots);
   StampNs before_ns = from_ns;
   if (from_ns < to_ns) stamps.push_back(to_ns);
   for (const StampNs stamp_ns : stamps) {
-    if (stamp_ns - before_ns > 1) look(target, source, before_ns + (stamp_ns - before_ns) / 2, silence, knots);
-    look(target, source, stamp_ns, silence, knots);
+    if (stamp_ns - before_ns > 1) look(target, source, before_ns + (stamp_ns - before_ns) / 2, silence, true, knots);
+    look(target, source, stamp_ns, silence, false, knots);
     before_ns = stamp_ns;
   }
   if (silence == Silence::STANDS && (knots.empty() || knots.back().stamp_ns < to_ns)) {

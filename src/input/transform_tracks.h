@@ -27,7 +27,7 @@ class TransformTracks : public FrameTracks {
   const TransformFeed& transforms_;
   const std::string& fixed_frame_;
 
-  void look(const std::string& target, const std::string& source, StampNs stamp_ns, Silence silence,
+  void look(const std::string& target, const std::string& source, StampNs stamp_ns, Silence silence, bool is_middle,
             std::vector<Knot>& knots) const;
 };
 

@@ -191,22 +191,32 @@ double leavesWayBy(const Body& body, double pose_scale, std::size_t parts) {
   return (offParts(body, parts) + arc + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
 }
 
-double offWay(const Body& body, const std::vector<Waypoint>& waypoints) {
-  std::array<Vec3, 8> corners;
-  if (body.turns && !waypoints.empty()) corners = cornersOf(body);
+WayBends::WayBends(const Body& body) : body_(body) {
+  if (body.turns) corners_ = cornersOf(body);
+}
+
+double WayBends::at(const Waypoint& before, const Waypoint& point, const Waypoint& after) const {
+  const double s = (point.u - before.u) / (after.u - before.u);
   double off = 0;
-  for (const Waypoint& point : waypoints) {
-    if (body.turns) {
-      const Eigen::Isometry3d moved = interpolate(body.pose_t0, body.pose_t1, point.u) * body.pose_t0.inverse();
-      const Eigen::Isometry3d there = point.pose * body.pose_t0.inverse();
-      for (const Vec3& p : corners) off = std::max(off, (there * p - moved * p).norm());
-    } else {
-      for (std::size_t v = 0; v < point.positions->size(); ++v) {
-        const Vec3 &t0 = (*body.t0)[v], &t1 = (*body.t1)[v];
-        off = std::max(off, ((*point.positions)[v] - (t0 + point.u * (t1 - t0))).norm());
-      }
-    }
+  if (body_.turns) {
+    const Eigen::Isometry3d from_t0 = body_.pose_t0.inverse();
+    const Eigen::Isometry3d without = interpolate(before.pose, after.pose, s) * from_t0, with = point.pose * from_t0;
+    for (const Vec3& p : corners_) off = std::max(off, (with * p - without * p).norm());
+    return off;
   }
+  for (std::size_t v = 0; v < point.positions->size(); ++v) {
+    const Vec3 &from = (*before.positions)[v], &to = (*after.positions)[v];
+    off = std::max(off, ((*point.positions)[v] - (from + s * (to - from))).norm());
+  }
+  return off;
+}
+
+double offWay(const Body& body, const std::vector<Waypoint>& waypoints) {
+  if (waypoints.empty()) return 0;
+  const WayBends bends(body);
+  const Waypoint start{0, body.pose_t0, body.t0}, end{1, body.pose_t1, body.t1};
+  double off = 0;
+  for (const Waypoint& point : waypoints) off = std::max(off, bends.at(start, point, end));
   return off;
 }
 

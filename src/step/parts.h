@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <vector>
 
@@ -17,6 +18,18 @@ double partsFor(const Body& body, double pose_scale, double tolerance_m, const E
 /// How far the body's straight vertex paths leave its way at most when the step is cut into so many equal parts [m],
 /// what placing them rounds included; 0 of one that goes straight.
 double leavesWayBy(const Body& body, double pose_scale, std::size_t parts);
+
+/// How far a body's places are from the ways between others [m]. Vertices that are not finite are not compared.
+class WayBends {
+ public:
+  explicit WayBends(const Body& body);
+  /// Of a place from the way that leads from one before it straight to one after it, or along the arc.
+  double at(const Waypoint& before, const Waypoint& point, const Waypoint& after) const;
+
+ private:
+  const Body& body_;
+  std::array<Vec3, 8> corners_;  ///< of what it spans at its start, if it turns
+};
 
 /// How far the waypoints are from the way that the body takes without them [m].
 double offWay(const Body& body, const std::vector<Waypoint>& waypoints);

@@ -171,29 +171,70 @@ std::vector<Knot> Monitor::Impl::trackOf(const MeshFrame& from, const MeshFrame&
   return why.empty() ? knots : std::vector<Knot>();
 }
 
+/// Where the body is between two of its frames: at the knots of what carries it, and at more of them until what is
+/// between leaves the way from one to the next by a quarter of the tolerance. A middle that is off by d leaves d / 4,
+/// for between two samples of tf joints turn evenly. False: it is not known, or not followed so far.
+bool Monitor::Impl::findPlaces(const MeshStore::Stretch& stretch, const Step& step, const Body& body,
+                               std::vector<Waypoint>& places, std::string& why) const {
+  const MeshFrame &from = *stretch.from, &to = *stretch.to;
+  std::vector<Knot> knots = trackOf(from, to, why);
+  if (!why.empty()) return false;
+  places.clear();
+  if (knots.empty() || standsStill(knots)) return true;
+  const Knot first = knots.front(), last = knots.back();
+  const auto placeAt = [&](const Knot& knot) {
+    return Waypoint{fractionOf(step, knot.stamp_ns), knot.pose * first.pose.inverse() * from.pose,
+                    body.turns ? nullptr : share(carriedTo(knot, first, last, from.positions, to.positions))};
+  };
+  const WayBends bends(body);
+  const double tolerance_m = options.detector.rigid_tolerance_m;
+  bool is_fine = false;
+  for (int round = 0; !is_fine && knots.size() <= tolerance::MOST_POSES_A_STEP; ++round) {
+    is_fine = true;
+    std::vector<Knot> finer;
+    for (std::size_t k = 0; k < knots.size(); ++k) {
+      Knot& knot = knots[k];
+      if (!knot.is_middle || bends.at(placeAt(knots[k - 1]), placeAt(knot), placeAt(knots[k + 1])) <= tolerance_m) {
+        finer.push_back(knot);
+        continue;
+      }
+      is_fine = false;
+      knot.is_middle = false;
+      for (const std::size_t side : {k - 1, k}) {
+        const std::vector<Knot> half =
+            tracks->between({}, to.carrier.frame, knots[side].stamp_ns, knots[side + 1].stamp_ns, to.carrier.silence);
+        if (side == k) finer.push_back(knot);
+        if (half.size() > 2) finer.insert(finer.end(), half.begin() + 1, half.end() - 1);
+      }
+    }
+    knots = std::move(finer);
+  }
+  if (!is_fine) why = "its way bends too much between two transforms";
+  for (const Knot& knot : knots) {
+    if (!knot.why_unknown.empty()) why = knot.why_unknown;
+    places.push_back(placeAt(knot));
+  }
+  return why.empty();
+}
+
 /// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it; a
 /// rigid body is carried as it is. Where that leaves the way from the step's start to its end, it becomes waypoints.
 void Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>& stretches, Step& step) const {
   Body& body = step.bodies[b];
-  std::vector<Waypoint> waypoints;
-  const auto add = [&](StampNs stamp_ns, const Eigen::Isometry3d& pose, std::shared_ptr<const Positions> positions) {
-    waypoints.push_back({fractionOf(step, stamp_ns), pose, body.turns ? nullptr : std::move(positions)});
+  std::vector<Waypoint> waypoints, places;
+  const auto add = [&](const Waypoint& place) {
+    if (place.u > 0 && place.u < 1 && (waypoints.empty() || place.u > waypoints.back().u)) waypoints.push_back(place);
   };
-  const auto isWithin = [&](StampNs stamp_ns) { return stamp_ns > step.start_ns && stamp_ns < step.stamp_ns; };
   for (const MeshStore::Stretch& stretch : stretches) {
-    const MeshFrame &from = *stretch.from, &to = *stretch.to;
     std::string why;
-    const std::vector<Knot> knots = trackOf(from, to, why);
-    if (!why.empty()) {
+    if (!findPlaces(stretch, step, body, places, why)) {
       sayUnknown("body '" + body.name + "'", why, step);
       return;
     }
-    for (std::size_t k = 1; k + 1 < knots.size() && !standsStill(knots); ++k) {
-      if (!isWithin(knots[k].stamp_ns)) continue;
-      add(knots[k].stamp_ns, knots[k].pose * knots.front().pose.inverse() * from.pose,
-          body.turns ? nullptr : share(carriedTo(knots[k], knots.front(), knots.back(), from.positions, to.positions)));
-    }
-    if (isWithin(to.stamp_ns)) add(to.stamp_ns, to.pose, {stretch.to, &to.positions});
+    for (std::size_t k = 1; k + 1 < places.size(); ++k) add(places[k]);
+    const std::shared_ptr<const MeshFrame>& to = stretch.to;
+    add({fractionOf(step, to->stamp_ns), to->pose,
+         body.turns ? nullptr : std::shared_ptr<const Positions>(to, &to->positions)});
   }
   if (offWay(body, waypoints) > options.detector.rigid_tolerance_m) body.waypoints = std::move(waypoints);
 }

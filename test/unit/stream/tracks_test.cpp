@@ -17,6 +17,7 @@ struct Said : FrameTracks {
   std::map<std::string, std::function<Eigen::Isometry3d(double)>> fixed_from;  ///< at a time [s]
   std::map<std::string, StampNs> unknown_at;
   std::uint64_t now = 1;
+  bool has_ends_alone = false;  ///< and the middle between them
 
   Eigen::Isometry3d poseOf(const std::string& frame, StampNs stamp_ns) const {
     if (frame.empty()) return Eigen::Isometry3d::Identity();
@@ -26,7 +27,11 @@ struct Said : FrameTracks {
                             Silence) const override {
     std::vector<Knot> knots;
     if (target == source) return knots;
-    for (StampNs at = from_ns; at < to_ns; at += 10 * MS) knots.push_back({at});
+    const StampNs step_ns = has_ends_alone ? (to_ns - from_ns + 1) / 2 : 10 * MS;
+    for (StampNs at = from_ns; at < to_ns; at += step_ns) {
+      knots.push_back({at});
+      knots.back().is_middle = has_ends_alone && at > from_ns;
+    }
     knots.push_back({to_ns});
     for (Knot& knot : knots) {
       knot.pose = poseOf(target, knot.stamp_ns).inverse() * poseOf(source, knot.stamp_ns);
@@ -104,6 +109,26 @@ TEST_F(Tracks, WhatIsCarriedGoesAsItsFrameDoes) {
       EXPECT_EQ(assuranceOf(outcome).clear(), depth < 1);
       if (depth < 1) continue;
       EXPECT_NEAR(outcome.earliest_toc, std::asin(std::sqrt(1 / depth)) / M_PI, 0.02);
+    }
+  }
+}
+
+// Between two knots what turns about a far joint leaves the way of whole poses: more of them are asked for.
+TEST_F(Tracks, WhatTurnsAboutAFarJointIsFollowedBetweenKnots) {
+  said.has_ends_alone = true;
+  for (const bool is_rigid : {false, true}) {
+    rigid = is_rigid;
+    for (const double height : {0.004, -0.004}) {
+      // A lever of 1 m swings through its lowest point, where the tip is at this height; at both ends it is 20 mm
+      // above.
+      said.fixed_from["hand"] = [height](double t) {
+        const Eigen::AngleAxisd turn(4 * (t - 0.15), Vec3::UnitX());
+        return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1 + height) * turn * Eigen::Translation3d(0, 0, -1));
+      };
+      const Outcome outcome = last();
+      ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+      EXPECT_EQ(assuranceOf(outcome).clear(), height > 0) << is_rigid;
+      EXPECT_GT(outcome.step->bodies[1].waypoints.size(), 3u);
     }
   }
 }
