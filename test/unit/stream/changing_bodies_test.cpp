@@ -32,9 +32,14 @@ class ChangingBodies : public ::testing::Test {
     for (Vec3& p : frame.positions) p.y() = 0.5 * static_cast<double>(body) - 1;
     monitor.push(body, std::move(frame), NOW);
   }
+  /// Where the next step begins, once there is a frame that it may begin at.
+  StampNs start() const {
+    const std::vector<StampNs> stamps = monitor.stampsToCome();
+    return stamps.empty() ? 0 : stamps.front();
+  }
   void come(std::size_t body, const std::string& name, double z) {
     monitor.setBody(body, named(name));
-    push(body, monitor.stampsToCome().front(), z);
+    push(body, start(), z);
   }
 };
 
@@ -81,7 +86,7 @@ TEST_F(ChangingBodies, WhatTouchesElsewhereGoesOn) {
   }
   // It goes: its own patch ends, the other one does not.
   monitor.setBody(2, named("other"));
-  push(2, monitor.stampsToCome().front(), 5);
+  push(2, start(), 5);
   const Outcome after = step({-0.5, 5});
   ASSERT_EQ(after.patches.size(), 1u);
   EXPECT_EQ(after.patches[0].id, before.patches[0].id);
@@ -100,7 +105,7 @@ TEST_F(ChangingBodies, WhatTouchesBehindABodyThatShrinksGoesOn) {
   monitor.setBody(1, named("nothing"));
   const auto nothing = share(Topology::fromTriangles(0, {}));
   const auto pushNothing = [&](StampNs at_ns) { monitor.push(1, {at_ns, nothing, {}}, NOW); };
-  pushNothing(monitor.stampsToCome().front());
+  pushNothing(start());
   stamp_ns += 100 * MS;
   pushNothing(stamp_ns);
   push(2, stamp_ns, -0.5);
@@ -122,7 +127,7 @@ TEST_F(ChangingBodies, StepsThatWaitAreAnsweredWithIt) {
   monitor.push(0, floor(stamp_ns, 0), NOW);
   Outcome outcome;
   ASSERT_FALSE(monitor.next(NOW, outcome)) << "waits for the tip";
-  EXPECT_EQ(monitor.stampsToCome().front(), stamp_ns - 100 * MS);
+  EXPECT_EQ(start(), stamp_ns - 100 * MS);
   come(2, "box", 1);
   push(2, stamp_ns, 1);
   push(1, stamp_ns, 1);
