@@ -38,7 +38,6 @@ bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs stamp_ns, std::uint64
 void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns) {
   Rigid& rigid = *rigid_[body];
   if (lost.empty()) {
-    if (rigid.lost) frame.doubt = "no transform of its frame where the step begins";
     rigid.pose = frame.pose;
   } else if (!rigid.lost && body < problems_.size()) {
     problems_[body] = "not watched meanwhile: " + lost;

@@ -252,9 +252,10 @@ void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Step& step) const {
     if (is_map ? !step.map.surface : isStream(b) || stores[b].empty()) continue;
     const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
     const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
-    const std::string name =
-        is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
-    const auto say = [&](const std::string& why) { sayUnknown(name, why, step); };
+    const auto name = [&] {
+      return is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
+    };
+    const auto say = [&](const std::string& why) { sayUnknown(name(), why, step); };
     if (frame && !frame->doubt.empty()) say(frame->doubt);
     if (!tracks || carrier.empty()) continue;
     const std::vector<Knot> knots =
@@ -279,7 +280,7 @@ void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Step& step) const {
     }
     if (off_m <= options.detector.rigid_tolerance_m) continue;
     std::ostringstream text;
-    text << name << " was seen up to " << off_m << " m from where it was at its stamp; "
+    text << name() << " was seen up to " << off_m << " m from where it was at its stamp; "
          << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
     addSentence(step.off_path, text.str());
   }

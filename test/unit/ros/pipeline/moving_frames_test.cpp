@@ -38,7 +38,7 @@ struct Moving : Driven {
 };
 
 // The tip is at z 0.5 at both ends, the cloth at 0.
-TEST(RigidBodies, ThatLeaveTheirPathBetweenTheEndsAreNoClearStep) {
+TEST(RigidBodies, AreFollowedBetweenTheEnds) {
   const auto lastOf = [](const std::vector<double>& between) {
     Moving scene(clothAndTip());
     for (int i = 0; i <= 2; ++i) scene.move("tip", 0.05 * i, 0.5);
@@ -55,18 +55,20 @@ TEST(RigidBodies, ThatLeaveTheirPathBetweenTheEndsAreNoClearStep) {
     EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "the step after is as it was seen";
     return through;
   };
-  for (const auto& dip : {std::vector<double>{-0.5}, {0.2, -0.5, -0.5, 0.2}, {0.5, 0.4985, 0.5}}) {
+  for (const auto& dip : {std::vector<double>{-0.5}, {0.2, -0.5, -0.5, 0.2}}) {
     const Outcome outcome = lastOf(dip);
-    EXPECT_EQ(outcome.status, StepStatus::PARTIAL);
-    EXPECT_TRUE(outcome.answered);
-    EXPECT_FALSE(assuranceOf(outcome).proved);
-    EXPECT_NE(outcome.reason.find("body 'tip' was seen up to"), std::string::npos) << outcome.reason;
-    EXPECT_NE(outcome.reason.find("poses of tf between its ends"), std::string::npos) << outcome.reason;
+    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+    EXPECT_EQ(assuranceOf(outcome).touching, Touching::NEW) << "through the cloth and back";
+    EXPECT_NEAR(outcome.earliest_toc, dip.size() == 1 ? 0.25 : 0.2 + 0.2 * 2 / 7, 0.01);
   }
-  EXPECT_TRUE(assuranceOf(lastOf({0.5, 0.4995, 0.5005})).clear()) << "within rigid_tolerance_m of 1 mm";
+  for (const auto& dip : {std::vector<double>{0.5, 0.4985, 0.5}, {0.5, 0.4995, 0.5005}, {0.2, 0.01, 0.2}}) {
+    EXPECT_TRUE(assuranceOf(lastOf(dip)).clear());
+  }
+  const Outcome wild = lastOf({0.5, 0.5, -30, 0.5, 0.5, 0.5, 30});
+  EXPECT_EQ(wild.status, StepStatus::OK) << "eight equal parts meet it: " << wild.reason;
 }
 
-TEST(RigidBodies, ThatTurnEvenlyAreOnTheirPath) {
+TEST(RigidBodies, ThatTurnEvenlyNeedNoWaypoints) {
   for (const double off : {0.0, 0.1}) {
     Moving scene(clothAndTip());
     for (int i = 0; i <= 10; ++i) scene.move("tip", 0.01 * i, 0.5, 0.1 * i + (i == 7 ? off : 0));
@@ -74,7 +76,8 @@ TEST(RigidBodies, ThatTurnEvenlyAreOnTheirPath) {
     scene.offer(0.05, 0);
     EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
     scene.offer(0.1, 0);
-    EXPECT_EQ(assuranceOf(scene.outcome).clear(), off == 0) << scene.outcome.reason;
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    EXPECT_EQ(scene.outcome.step->bodies[1].waypoints.empty(), off == 0);
   }
 }
 
@@ -200,7 +203,8 @@ TEST(RigidBodies, WhoseStaticTransformBecomesAnotherOneHaveNoPlaceInThatStep) {
     if (changes) tip.transforms[0].header.frame_id = "stand";
     scene.feed_tf.add(tip, true);
     scene.offer(0.1, 0);
-    EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL) << scene.outcome.reason;
+    EXPECT_FALSE(assuranceOf(scene.outcome).clear()) << "the arm dips through the cloth";
+    EXPECT_EQ(scene.outcome.status, changes ? StepStatus::PARTIAL : StepStatus::OK) << scene.outcome.reason;
     EXPECT_EQ(scene.outcome.reason.find("or a static transform is another one") != std::string::npos, changes)
         << scene.outcome.reason;
     scene.offer(0.15, 0);
@@ -231,11 +235,10 @@ TEST(RigidBodies, OfAnArmThatSwingsAreProvedInEachStep) {
   for (const Rates& rates : {Rates{1, 500, 30}, Rates{1.5, 30, 10}, Rates{1.5, 100, 30}}) {
     Moving scene(clothAndTip());
     std::size_t proved = 0, steps = 0, in_parts = 0;
-    double told = -1;
+    double told = -0.2;
     for (int k = 0; k <= static_cast<int>(3 * rates.cloth_hz); ++k) {
       const double at = k / rates.cloth_hz;
       for (; told < at + 1.5 / rates.tf_hz; told += 1 / rates.tf_hz) {
-        if (told < 0) continue;
         const double angle = rates.speed / 2 * std::sin(2 * told);
         geometry_msgs::TransformStamped shoulder = above("shoulder", 0.8, after(told), angle),
                                         elbow = above("elbow", 0, after(told), angle),
@@ -245,8 +248,9 @@ TEST(RigidBodies, OfAnArmThatSwingsAreProvedInEachStep) {
         elbow.transform.translation.x = tip.transform.translation.x = 0.3;
         scene.tell({shoulder, elbow, tip});
       }
-      EXPECT_TRUE(scene.offer(at, 0));
+      ASSERT_TRUE(scene.offer(at, 0));
       if (k == 0) continue;
+      ASSERT_TRUE(scene.outcome.answered) << scene.outcome.reason;
       ++steps;
       proved += assuranceOf(scene.outcome).clear();
       in_parts += !scene.outcome.step->bodies[1].waypoints.empty();

@@ -352,6 +352,8 @@ TEST_F(Attached, MistakesAreNamedAndAllStays) {
   for (int i = 0; i < 63; ++i) attach(plate("plate " + std::to_string(i)));
   EXPECT_TRUE(mentions(refusal(plate()), "there are 64 already, which is the most"));
   feed(1.1, 0, 0.8f);
+  EXPECT_FALSE(said().proved) << "when it was let go nobody says";
+  feed(1.2, 0, 0.8f);
   EXPECT_TRUE(said().clear()) << joinedText(said().missing);
 }
 
