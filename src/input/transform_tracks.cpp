@@ -73,8 +73,13 @@ std::vector<Knot> TransformTracks::between(const std::string& target_name, const
   StampNs before_ns = from_ns;
   if (from_ns < to_ns) stamps.push_back(to_ns);
   for (const StampNs stamp_ns : stamps) {
-    if (stamp_ns - before_ns > 1) look(target, source, before_ns + (stamp_ns - before_ns) / 2, silence, true, knots);
-    look(target, source, stamp_ns, silence, false, knots);
+    std::vector<Knot> sample;
+    look(target, source, stamp_ns, silence, false, sample);
+    const bool is_known = !sample.empty() && sample.front().why_unknown.empty();  // else that is enough to say
+    if (is_known && stamp_ns - before_ns > 1) {
+      look(target, source, before_ns + (stamp_ns - before_ns) / 2, silence, true, knots);
+    }
+    knots.insert(knots.end(), sample.begin(), sample.end());
     before_ns = stamp_ns;
   }
   if (silence == Silence::STANDS && (knots.empty() || knots.back().stamp_ns < to_ns)) {
