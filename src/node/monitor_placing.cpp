@@ -305,14 +305,19 @@ std::string MonitorPipeline::doubtOf(std::size_t body, const DecodedMesh& mesh, 
 /// step takes them straight in the fixed frame.
 std::string MonitorPipeline::offWay(std::size_t body, const DecodedMesh& mesh, const Eigen::Isometry3d& fixed_from_mesh,
                                     std::uint64_t times_forgotten) {
-  if (isStatic(body) || mesh.frame_id == fixed_frame_) {
-    carried_[body].reset();
-    return {};
+  if (isStatic(body)) return {};
+  const bool is_fixed = mesh.frame_id == fixed_frame_;
+  const std::optional<Carried> last =
+      std::exchange(carried_[body], Carried{mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh,
+                                            is_fixed ? Positions() : mesh.positions});
+  if (!last) return {};
+  if (last->frame_id != mesh.frame_id) {
+    if (!mayBeAStep(last->at.stamp_ns, mesh.stamp_ns)) return {};
+    return "its frame_id was '" + shortText(last->frame_id, MAX_NAME) + "' in the frame before, is '" +
+           shortText(mesh.frame_id, MAX_NAME) + "' now, and nobody says how it went from the one to the other";
   }
-  const std::optional<Carried> last = std::exchange(
-      carried_[body], Carried{mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh, mesh.positions});
-  // With another number of vertices there is no step. Where the frame is another one now, nobody says how it went.
-  if (!last || last->frame_id != mesh.frame_id || last->positions.size() != mesh.positions.size()) return {};
+  // With another number of vertices there is no step.
+  if (is_fixed || last->positions.size() != mesh.positions.size()) return {};
   const std::vector<SeenPose> seen = posesBetween(fixed_frame_, mesh.frame_id, last->at, mesh.stamp_ns);
   double off_m = 0;
   for (const SeenPose& one : seen) {
