@@ -349,6 +349,71 @@ def a_mesh_in_a_chain_of_which_a_joint_swings(c):
     c.body('sheet', [(x + .35, y, 0) for x, y, _ in SHEET], 3, every(.1))
 
 
+def down(t):
+    return max(.02, .3 - .5 * t)
+
+
+def owned(c, times=every(.1)):
+    """A sheet that comes down upon voxels of 5 cm, of which some may be its own."""
+    c.params.update(own_voxels_m='auto', own_voxels_lag_s=0.1)
+    c.body('sheet', SMALL, 2, times, z=down)
+
+
+def an_obstacle_that_was_there_before_the_body(c):
+    owned(c)
+    c.map([(9, 9, 9), (0, 0, 0)], -.05)
+
+
+def a_voxel_that_appears_within_reach(c):
+    owned(c)
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0)], .65)
+
+
+def a_voxel_that_appears_out_of_reach(c):
+    owned(c)
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0)], .15)
+
+
+def a_voxel_that_the_body_hid_and_that_comes_back(c):
+    owned(c, every(.1, 1.5))
+    c.map([(9, 9, 9), (0, 0, 0)], -.05)
+    c.map([(9, 9, 9)], .62)
+    c.map([(9, 9, 9), (0, 0, 0)], .92)
+
+
+def a_first_map_that_shows_the_body_and_perhaps_more(c):
+    c.params.update(own_voxels_m='auto')
+    c.body('sheet', SMALL, 2, every(.1), z=lambda t: .02)
+    c.map([(9, 9, 9), (0, 0, 0)], -.05, stamp_at=.05)
+
+
+def camera(c, points, times):
+    c.params.update(obstacle_cloud_topic='/points', obstacle_resolution_m=.05)
+    c.tf('eye', [-.2], z=lambda t: 1, topic='/tf_static')
+    for t in times:
+        c.add('/points', worlds.World.cloud([(x, y, z - 1) for x, y, z in points(t)], 1, c.ns(t), 'eye'), t)
+
+
+def a_cloud_that_shows_an_obstacle(c):
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    camera(c, lambda t: [(.012, .013, .021), (.4, .4, .4)], every(.1, 1.0, -.05))
+
+
+def a_cloud_that_shows_an_obstacle_below_what_it_may_show_of_the_body(c):
+    owned(c)
+    camera(c, lambda t: [(.012, .013, .021 if t < .3 else down(t)), (.4, .4, .4)], every(.1, 1.0, -.05))
+
+
+def a_camera_in_a_frame_that_tf_has_late(c):
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    camera(c, lambda t: [(.012, .013, .021), (.4, .4, .4)], every(.1, 1.0, -.05))
+    for row in c.rows:
+        if row[0] == '/tf_static':
+            row[0], row[1].transforms[0].header.stamp = '/tf', worlds.stamp(c.ns(.4))
+
+
 CASES = {name: make for name, make in list(globals().items()) if callable(make) and getattr(make, '__code__', None)
          and make.__code__.co_varnames[:1] == ('c',) and make.__code__.co_argcount == 1}
 
