@@ -307,9 +307,10 @@ std::string MonitorPipeline::offWay(std::size_t body, const DecodedMesh& mesh, c
                                     std::uint64_t times_forgotten) {
   if (isStatic(body)) return {};
   const bool is_fixed = mesh.frame_id == fixed_frame_;
-  const std::optional<Carried> last =
-      std::exchange(carried_[body], Carried{mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh,
-                                            is_fixed ? Positions() : mesh.positions});
+  const std::optional<Carried> last = std::exchange(
+      carried_[body],
+      Carried{
+          mesh.frame_id, {mesh.stamp_ns, times_forgotten}, fixed_from_mesh, is_fixed ? Positions() : mesh.positions});
   if (!last) return {};
   if (last->frame_id != mesh.frame_id) {
     if (!mayBeAStep(last->at.stamp_ns, mesh.stamp_ns)) return {};

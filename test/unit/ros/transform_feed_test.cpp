@@ -96,7 +96,7 @@ TEST_F(TransformFeedTest, AFrameThatWasElsewhereAtAStampBeginsAnew) {
   EXPECT_FALSE(feed.clears(turned("finger", std::numeric_limits<double>::quiet_NaN(), 1.25, 5), false)) << "left out";
 }
 
-// The frame came for 1.5 s as well, and that was forgotten: on the way from 1.25 s to 1.75 s nobody knows where it went.
+// The frame came for 1.5 s as well, and that was forgotten: from 1.25 s to 1.75 s nobody knows where it went.
 TEST_F(TransformFeedTest, WhatWasForgottenAfterAStampIsAGapUpToTheNextOne) {
   for (const char* second : {"/arm", "/other"}) {
     feed.add(turned("camera", 1, 1, 0), false, "/camera");
