@@ -175,10 +175,12 @@ class Reader:
         if topology.get('rows') and topology.get('cols'):
             return self.reuse(('grid', topology['rows'], topology['cols']), lambda: grid(topology['rows'], topology['cols']))
         if topology.get('source') == 'polyline':
-            return self.reuse(('rope', len(positions)), lambda: Surface(len(positions), lines=rope(len(positions))))
+            each = len(positions) // self.ropes_in_rows
+            return self.reuse(('rope', len(positions), each), lambda: Surface(len(positions), lines=np.concatenate(
+                [rope(each, begin) for begin in range(0, len(positions), each)])))
         return None
 
-    made = (None, None)
+    made, ropes_in_rows = (None, None), 1
 
     def reuse(self, key, make):
         if self.made[0] != key:
@@ -189,8 +191,7 @@ class Reader:
         points = cloud_points(m)
         if not len(points):
             raise Refused('no points')
-        if self.topology().get('source') == 'polyline' and m.height > 1 and m.width > 1:
-            raise NotCovered('ropes in the rows of a cloud')
+        self.ropes_in_rows = m.height if m.width > 1 else 1
         surface = self.reuse(('grid', m.height, m.width), lambda: grid(m.height, m.width)) \
             if m.height > 1 and m.width > 1 else None
         return points, surface, 0

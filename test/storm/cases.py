@@ -349,6 +349,14 @@ def a_mesh_in_a_chain_of_which_a_joint_swings(c):
     c.body('sheet', [(x + .35, y, 0) for x, y, _ in SHEET], 3, every(.1))
 
 
+def ropes_in_the_rows_of_a_cloud(c):
+    c.body('sheet', SHEET, 3, every(.1))
+    c.params['bodies']['sheet']['topology'] = {'source': 'polyline'}
+    for _, message, _, _ in c.rows:
+        message.height, message.width, message.row_step = 3, 3, 36
+    c.body('object', [(x, y - .01, h) for x, y, h in SMALL], 2, every(.1), z=lambda t: .32 - t * .4)
+
+
 def down(t):
     return max(.02, .3 - .5 * t)
 
