@@ -62,6 +62,14 @@ def less(map_, numbers):
     return replace(map_, corners=np.concatenate([corners[~hit], rest]), sizes=np.append(sizes[~hit], np.ones(len(rest), int)))
 
 
+def with_unknown(map_, box):
+    """The map, in which each voxel wholly within the box of which it tells nothing is an obstacle."""
+    low, high = (np.array(box[i:i + 3]) / map_.resolution + 32768 for i in (0, 3))
+    every = voxels(np.zeros((1, 3), int), np.array([65536]), np.ceil(low - 1e-6).astype(int), np.floor(high + 1e-6).astype(int))
+    unknown = unpacked(every[~shown(map_.leaves, every) & ~shown(map_.free, every)])
+    return replace(map_, corners=np.concatenate([map_.corners, unknown]), sizes=np.append(map_.sizes, np.ones(len(unknown), int)))
+
+
 class Owned:
     """reach: by name, how near a voxel is to be [m]; 'auto' for the edge of one."""
 

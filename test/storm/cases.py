@@ -40,9 +40,10 @@ class Case:
     def finger(self, frame):
         self.params['bodies']['finger'] = {'rigid': {'mesh': self.folder + '/finger.obj', 'frame': frame}, 'against_obstacle': False}
 
-    def map(self, keys, at, stamp_at=None, frame='world'):
+    def map(self, keys, at, stamp_at=None, frame='world', free=()):
         self.params['octomap_topic'] = '/map'
-        message = Octomap(binary=True, id='OcTree', resolution=.05, data=worlds.octree({tuple(32768 + k for k in key) for key in keys}))
+        bits = worlds.octree(*({tuple(32768 + k for k in key) for key in some} for some in (keys, free)))
+        message = Octomap(binary=True, id='OcTree', resolution=.05, data=bits)
         message.header.frame_id, message.header.stamp = frame, worlds.stamp(self.ns(at if stamp_at is None else stamp_at))
         self.add('/map', message, at)
 
@@ -395,6 +396,21 @@ def a_first_map_that_shows_the_body_and_perhaps_more(c):
     c.params.update(own_voxels_m='auto')
     c.body('sheet', SMALL, 2, every(.1), z=lambda t: .02)
     c.map([(9, 9, 9), (0, 0, 0)], -.05, stamp_at=.05)
+
+
+def a_space_below_a_sheet_of_which_nothing_is_known(c):
+    c.params.update(unknown_space='occupied', unknown_box=[-.1, -.1, -.1, .2, .2, .35])
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    c.map([(9, 9, 9)], -.05, free=[(x, y, z) for x in range(-2, 4) for y in range(-2, 4) for z in range(2, 7)])
+
+
+def an_obstacle_that_the_map_forgot_and_shows_again(c):
+    """The map tells what it has seen free, and of the obstacle it tells nothing for a while."""
+    owned(c, every(.1, 1.5))
+    far = [(x, y, 9) for x in range(4) for y in range(4)]
+    c.map([(9, 9, 9), (0, 0, 0)], -.05, free=far)
+    c.map([(9, 9, 9)], .12, free=far)
+    c.map([(9, 9, 9), (0, 0, 0)], .92, free=far)
 
 
 def camera(c, points, times):

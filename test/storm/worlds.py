@@ -26,17 +26,19 @@ def stamp(ns):
     return rospy.Time(ns // NS, ns % NS)
 
 
-def octree(keys):
-    """The bytes of a binary octree that has these finest voxels, of keys."""
+def octree(keys, free=()):
+    """The bytes of a binary octree that has these finest voxels, of keys, and has seen those others free."""
     tree = {}
-    for key in keys:
-        node = tree
-        for level in range(15, -1, -1):
-            node = node.setdefault(sum((k >> level & 1) << i for i, k in enumerate(key)), {})
+    for kind, some in ((1, free), (2, keys)):
+        for key in some:
+            node = tree
+            for level in range(15, -1, -1):
+                child = sum((k >> level & 1) << i for i, k in enumerate(key))
+                node = node.setdefault(child, {}) if level else node.update({child: kind})
     out = []
 
     def write(node, level):
-        kinds = [0 if i not in node else 2 if level == 0 else 3 for i in range(8)]
+        kinds = [0 if i not in node else node[i] if level == 0 else 3 for i in range(8)]
         bits = sum(kind << (2 * i) for i, kind in enumerate(kinds))
         out.extend((bits & 255, bits >> 8))
         for i in range(8):
