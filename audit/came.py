@@ -175,10 +175,12 @@ class Reader:
         if topology.get('rows') and topology.get('cols'):
             return self.reuse(('grid', topology['rows'], topology['cols']), lambda: grid(topology['rows'], topology['cols']))
         if topology.get('source') == 'polyline':
-            return self.reuse(('rope', len(positions)), lambda: Surface(len(positions), lines=rope(len(positions))))
+            each = len(positions) // self.ropes_in_rows
+            return self.reuse(('rope', len(positions), each), lambda: Surface(len(positions), lines=np.concatenate(
+                [rope(each, begin) for begin in range(0, len(positions), each)])))
         return None
 
-    made = (None, None)
+    made, ropes_in_rows = (None, None), 1
 
     def reuse(self, key, make):
         if self.made[0] != key:
@@ -189,8 +191,7 @@ class Reader:
         points = cloud_points(m)
         if not len(points):
             raise Refused('no points')
-        if self.topology().get('source') == 'polyline' and m.height > 1 and m.width > 1:
-            raise NotCovered('ropes in the rows of a cloud')
+        self.ropes_in_rows = m.height if m.width > 1 else 1
         surface = self.reuse(('grid', m.height, m.width), lambda: grid(m.height, m.width)) \
             if m.height > 1 and m.width > 1 else None
         return points, surface, 0
@@ -426,6 +427,9 @@ def links(path, files):
 # -- octomaps -----------------------------------------------------------------------------------------------------------
 
 
+NO_KEYS = np.empty((0, 3), int)
+
+
 @dataclass
 class Map:
     """Occupied leaves as cubes: the smallest key and the edge, in voxels. Key k begins at (k - 32768) resolution."""
@@ -437,6 +441,11 @@ class Map:
     came: int = 0
     number: int = 0
     problem: str = ''  # why it cannot be read
+    free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
+
+    @property
+    def leaves(self):
+        return self.corners, self.sizes
 
     def boxes(self):
         keys = self.corners.astype(float) - 32768
@@ -462,10 +471,9 @@ class Map:
 
 
 def leaves_of(data, binary, bytes_a_node=4):
-    corners, sizes, at = [], [], 0
-    if not len(data):
-        return np.empty((0, 3), int), np.empty(0, int)
-    stack = [(0, 0, 0, 65536)]
+    """Those that are occupied, and those that are free: smallest keys, and edges."""
+    found, at = ([], []), 0
+    stack = [(0, 0, 0, 65536)] if len(data) else []
     while stack:
         x, y, z, size = stack.pop()
         half = size // 2
@@ -475,18 +483,17 @@ def leaves_of(data, binary, bytes_a_node=4):
             at += 2
             kinds = [bits >> (2 * i) & 3 for i in range(8)]
             for i in range(8):
-                if kinds[i] == 2:
-                    corners.append(child(i)[:3])
-                    sizes.append(half)
+                if kinds[i] in (1, 2):
+                    found[kinds[i] == 1].append(child(i))
             stack += [child(i) for i in reversed(range(8)) if kinds[i] == 3]
         else:
             value, bits = struct.unpack_from('<f', data, at)[0], data[at + bytes_a_node]
             at += bytes_a_node + 1
-            if bits == 0 and value >= 0:
-                corners.append((x, y, z))
-                sizes.append(size)
+            if bits == 0:
+                found[value < 0].append((x, y, z, size))
             stack += [child(i) for i in reversed(range(8)) if bits >> i & 1]
-    return np.array(corners, int).reshape(-1, 3), np.array(sizes, int)
+    found = [np.array(leaves, int).reshape(-1, 4) for leaves in found]
+    return [(leaves[:, :3], leaves[:, 3]) for leaves in found]
 
 
 def octomap(data, binary, kind, resolution):
@@ -498,8 +505,30 @@ def octomap(data, binary, kind, resolution):
     nodes = {'OcTree': 4, 'ColorOcTree': 7}
     if not binary and kind not in nodes:
         raise NotCovered('a full octomap of type %s' % kind)
-    corners, sizes = leaves_of(data, binary, nodes.get(kind, 4))
-    return Map(resolution, corners, sizes)
+    occupied, free = leaves_of(data, binary, nodes.get(kind, 4))
+    return Map(resolution, *occupied, free=free)
+
+
+def picture_points(m, info):
+    """Pixels of a depth picture, as points of its optical frame; those without a depth are NaN."""
+    kind, metres = {'16UC1': ('u2', 0.001), 'mono16': ('u2', 0.001), '32FC1': ('f4', 1.0)}[m.encoding]
+    depth = np.ndarray((m.height, m.width), ('>' if m.is_bigendian else '<') + kind, m.data, 0, (m.step, np.dtype(kind).itemsize))
+    z = np.where(depth > 0, depth * metres, np.nan)
+    v, u = np.indices(z.shape)
+    return np.stack([(u - info.P[2]) * z / info.P[0], (v - info.P[6]) * z / info.P[5], z], 2).reshape(-1, 3)
+
+
+def filled(points, sensor, settings, most_off=1e-4):
+    """The voxels that a cloud of the map's frame fills for certain: keys. A point next to a border may be in either voxel."""
+    edge, box = settings.get('obstacle_resolution_m', 0.05), settings.get('obstacle_box')
+    away = np.linalg.norm(points - sensor, axis=1)
+    most = settings.get('obstacle_max_range_m', 0) or 4000 * edge
+    points = points[(away > settings.get('obstacle_min_range_m', 0.01) * (1 + 1e-6)) & (away < most * (1 - 1e-6))]
+    if box:
+        points = points[((points > np.array(box[:3]) + edge) & (points < np.array(box[3:]) - edge)).all(1)]
+    keys = np.floor(points / edge)
+    inside = np.abs(points / edge - keys - 0.5).max(1, initial=0) < 0.5 - most_off
+    return np.unique(keys[inside].astype(int) + 32768, axis=0).reshape(-1, 3)
 
 
 def octomap_message(message, came, number):

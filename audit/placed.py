@@ -83,9 +83,10 @@ class Transforms:
     def judge(self, said, ahead, begun):
         """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
         self.said, self.read, self.begun, self.poses = said, said + ahead, begun, {}
-        if ahead:
-            for samples in self.static.values():
-                samples[0].came = 0
+
+    def have_statics_from_start(self):
+        for samples in self.static.values():
+            samples[0].came = 0
 
     def known(self, samples):
         return [s for s in samples if s.came <= (self.said if s.static else self.read)]
@@ -112,9 +113,10 @@ class Transforms:
             j += 1
         if i < 0 or j == len(moving):
             raise Unknown('no transform of %s at %.9f s' % (child, stamp / NS))
+        i, j = (bisect.bisect_left(stamps, stamps[k]) for k in (i, j))  # of one stamp the first that came
         for k in (i, j):
-            for other in self.known(moving[bisect.bisect_left(stamps, stamps[k]):bisect.bisect_right(stamps, stamps[k])]):
-                if other.came < self.read and max(other.off(moving[k])) > 1e-6:
+            for other in moving[k:bisect.bisect_right(stamps, stamps[k])]:
+                if other.came < self.said and max(other.off(moving[k])) > 1e-6:
                     raise Unknown('frame %s was at two places at the stamp %.9f s' % (child, stamps[k] / NS))
         if moving[i].parent != moving[j].parent:
             raise Unknown('frame %s changes its parent at %.9f s' % (child, stamp / NS))
@@ -258,7 +260,7 @@ class Stream(Track):
     def knots(self, start, end):
         frames = self.around(start, end)
         if len({f.frame for f in frames}) > 1:
-            raise NotCovered('%s comes in several frames' % self.name)
+            raise Unknown('%s comes in another frame within the step, and nobody says how it went' % self.name)
         return [f.stamp for f in frames if start < f.stamp < end] + self.transforms.knots(frames[0].frame, self.fixed, start, end)
 
     def at(self, stamp, start, end):

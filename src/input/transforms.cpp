@@ -228,16 +228,19 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       frame->fixed = sent;
     } else {
       const Jump jump = jumpOf(transform, *sent.sender);
+      const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+      const bool hides_later = jump != Jump::NONE && frame->sent.rbegin()->first <= stamp_ns + JUMP_BACK_NS;
       const bool is_full = kept_count_ >= max_kept_;
       cleared = cleared || is_full || jump != Jump::NONE;
       if (is_full) clear();
       if (jump == Jump::TWO_SENDERS) forget(*frame);
       if (jump == Jump::LOOP) forgetAllOf(*sent.sender);
       if (isRepeated(transform, sent, *frame)) {
-        const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
         if (!isSame(frame->sent.at(stamp_ns), sent, tolerance::SAME_PLACE)) passOver(transform);
         continue;
       }
+      // What was sent for a time after this one is forgotten. Up to the next one nobody knows where the frame went.
+      frame->passed_over = frame->passed_over || hides_later;
       if (frame->is_apart) continue;
     }
     buffer_.setTransform(transform, "tf", is_static);

@@ -40,9 +40,10 @@ class Case:
     def finger(self, frame):
         self.params['bodies']['finger'] = {'rigid': {'mesh': self.folder + '/finger.obj', 'frame': frame}, 'against_obstacle': False}
 
-    def map(self, keys, at, stamp_at=None, frame='world'):
+    def map(self, keys, at, stamp_at=None, frame='world', free=()):
         self.params['octomap_topic'] = '/map'
-        message = Octomap(binary=True, id='OcTree', resolution=.05, data=worlds.octree({tuple(32768 + k for k in key) for key in keys}))
+        bits = worlds.octree(*({tuple(32768 + k for k in key) for key in some} for some in (keys, free)))
+        message = Octomap(binary=True, id='OcTree', resolution=.05, data=bits)
         message.header.frame_id, message.header.stamp = frame, worlds.stamp(self.ns(at if stamp_at is None else stamp_at))
         self.add('/map', message, at)
 
@@ -347,6 +348,94 @@ def a_mesh_in_a_chain_of_which_a_joint_swings(c):
     swing(c, 'hand', .6, every(.1, 1.1, -.1))
     c.body('object', [(x, y, -.01 + h) for x, y, h in SMALL[:2]] + [(0, 0, .02), (.02, 0, .02)], 2, every(.1), frame='hand')
     c.body('sheet', [(x + .35, y, 0) for x, y, _ in SHEET], 3, every(.1))
+
+
+def ropes_in_the_rows_of_a_cloud(c):
+    c.body('sheet', SHEET, 3, every(.1))
+    c.params['bodies']['sheet']['topology'] = {'source': 'polyline'}
+    for _, message, _, _ in c.rows:
+        message.height, message.width, message.row_step = 3, 3, 36
+    c.body('object', [(x, y - .01, h) for x, y, h in SMALL], 2, every(.1), z=lambda t: .32 - t * .4)
+
+
+def down(t):
+    return max(.02, .3 - .5 * t)
+
+
+def owned(c, times=every(.1)):
+    """A sheet that comes down upon voxels of 5 cm, of which some may be its own."""
+    c.params.update(own_voxels_m='auto', own_voxels_lag_s=0.1)
+    c.body('sheet', SMALL, 2, times, z=down)
+
+
+def an_obstacle_that_was_there_before_the_body(c):
+    owned(c)
+    c.map([(9, 9, 9), (0, 0, 0)], -.05)
+
+
+def a_voxel_that_appears_within_reach(c):
+    owned(c)
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0)], .65)
+
+
+def a_voxel_that_appears_out_of_reach(c):
+    owned(c)
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0)], .15)
+
+
+def a_voxel_that_the_body_hid_and_that_comes_back(c):
+    owned(c, every(.1, 1.5))
+    c.map([(9, 9, 9), (0, 0, 0)], -.05)
+    c.map([(9, 9, 9)], .62)
+    c.map([(9, 9, 9), (0, 0, 0)], .92)
+
+
+def a_first_map_that_shows_the_body_and_perhaps_more(c):
+    c.params.update(own_voxels_m='auto')
+    c.body('sheet', SMALL, 2, every(.1), z=lambda t: .02)
+    c.map([(9, 9, 9), (0, 0, 0)], -.05, stamp_at=.05)
+
+
+def a_space_below_a_sheet_of_which_nothing_is_known(c):
+    c.params.update(unknown_space='occupied', unknown_box=[-.1, -.1, -.1, .2, .2, .35])
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    c.map([(9, 9, 9)], -.05, free=[(x, y, z) for x in range(-2, 4) for y in range(-2, 4) for z in range(2, 7)])
+
+
+def an_obstacle_that_the_map_forgot_and_shows_again(c):
+    """The map tells what it has seen free, and of the obstacle it tells nothing for a while."""
+    owned(c, every(.1, 1.5))
+    far = [(x, y, 9) for x in range(4) for y in range(4)]
+    c.map([(9, 9, 9), (0, 0, 0)], -.05, free=far)
+    c.map([(9, 9, 9)], .12, free=far)
+    c.map([(9, 9, 9), (0, 0, 0)], .92, free=far)
+
+
+def camera(c, points, times):
+    c.params.update(obstacle_cloud_topic='/points', obstacle_resolution_m=.05)
+    c.tf('eye', [-.2], z=lambda t: 1, topic='/tf_static')
+    for t in times:
+        c.add('/points', worlds.World.cloud([(x, y, z - 1) for x, y, z in points(t)], 1, c.ns(t), 'eye'), t)
+
+
+def a_cloud_that_shows_an_obstacle(c):
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    camera(c, lambda t: [(.012, .013, .021), (.4, .4, .4)], every(.1, 1.0, -.05))
+
+
+def a_cloud_that_shows_an_obstacle_below_what_it_may_show_of_the_body(c):
+    owned(c)
+    camera(c, lambda t: [(.012, .013, .021 if t < .3 else down(t)), (.4, .4, .4)], every(.1, 1.0, -.05))
+
+
+def a_camera_in_a_frame_that_tf_has_late(c):
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    camera(c, lambda t: [(.012, .013, .021), (.4, .4, .4)], every(.1, 1.0, -.05))
+    for row in c.rows:
+        if row[0] == '/tf_static':
+            row[0], row[1].transforms[0].header.stamp = '/tf', worlds.stamp(c.ns(.4))
 
 
 CASES = {name: make for name, make in list(globals().items()) if callable(make) and getattr(make, '__code__', None)

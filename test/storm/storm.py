@@ -60,11 +60,17 @@ def judge(world, folder):
     """What analyze_bag says of the world, held against what came."""
     folder = pathlib.Path(folder)
     bag, params, out = folder / 'world.bag', folder / 'params.yaml', folder / 'out.bag'
+    connections = {}
     with rosbag.Bag(str(bag), 'w') as written:
         for topic, message, at, publisher in world.rows:
+            # rosbag has one connection for a topic, and with it one publisher, unless it is made to forget it.
+            written._topic_connections.pop(topic, None)
+            if (topic, publisher) in connections:
+                written._topic_connections[topic] = connections[topic, publisher]
             header = {'callerid': '/' + publisher.strip('/'), 'topic': topic, 'message_definition': message._full_text,
                       'md5sum': message._md5sum, 'type': message._type, 'latching': '0'}
             written.write(topic, message, worlds.stamp(at), connection_header=header)
+            connections[topic, publisher] = written._topic_connections[topic]
     params.write_text(yaml.safe_dump(world.params))
     (folder / 'finger.obj').write_text(worlds.FINGER_OBJ)
     (folder / 'arm.urdf').write_text(worlds.ROBOT)

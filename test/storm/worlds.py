@@ -26,17 +26,19 @@ def stamp(ns):
     return rospy.Time(ns // NS, ns % NS)
 
 
-def octree(keys):
-    """The bytes of a binary octree that has these finest voxels, of keys."""
+def octree(keys, free=()):
+    """The bytes of a binary octree that has these finest voxels, of keys, and has seen those others free."""
     tree = {}
-    for key in keys:
-        node = tree
-        for level in range(15, -1, -1):
-            node = node.setdefault(sum((k >> level & 1) << i for i, k in enumerate(key)), {})
+    for kind, some in ((1, free), (2, keys)):
+        for key in some:
+            node = tree
+            for level in range(15, -1, -1):
+                child = sum((k >> level & 1) << i for i, k in enumerate(key))
+                node = node.setdefault(child, {}) if level else node.update({child: kind})
     out = []
 
     def write(node, level):
-        kinds = [0 if i not in node else 2 if level == 0 else 3 for i in range(8)]
+        kinds = [0 if i not in node else node[i] if level == 0 else 3 for i in range(8)]
         bits = sum(kind << (2 * i) for i, kind in enumerate(kinds))
         out.extend((bits & 255, bits >> 8))
         for i in range(8):
@@ -88,6 +90,7 @@ class World:
         if r.random() < .5:
             self.map()
         self.options()
+        self.camera(random.Random(-seed))  # of its own, so that worlds without a camera stay what they were
         self.rows.sort(key=lambda row: row[2])
         self.faults = []
         if not self.tame:
@@ -217,6 +220,19 @@ class World:
             self.add('/map', message, at, r.choice([0, .03, .15]) if k else 0)
         if r.random() < .3:
             self.params['exclude_boxes'] = [[-.1, -.1, r.uniform(-.2, .1), .1, .1, .3]]
+
+    def camera(self, r):
+        """Own voxels of a map, or clouds that make one."""
+        if self.tame or 'exclude_boxes' in self.params or r.random() < .6:
+            return
+        self.params.update(own_voxels_m=r.choice(['auto', .03]), own_voxels_lag_s=r.choice([0, .1]))
+        if 'octomap_topic' in self.params:
+            return
+        self.params.update(obstacle_cloud_topic='/points', obstacle_resolution_m=r.choice([.02, .05]))
+        points = [(r.uniform(-.15, .15), r.uniform(-.15, .15), r.uniform(-.2, .2)) for _ in range(r.choice([1, 5, 20]))]
+        for at in [0.02 + .1 * k for k in range(int(10 * self.seconds))]:
+            seen = [p for p in points if r.random() < .9] + [(r.uniform(-.2, .2), r.uniform(-.2, .2), r.uniform(-.2, .2))]
+            self.add('/points', self.cloud(seen, 1, self.ns(at), 'mount'), at, .03)
 
     def options(self):
         r, p = self.r, self.params

@@ -1,0 +1,192 @@
+"""What is a body's own: of each map the most that the rule of doc/algorithm.md, own voxels, lets a body account for.
+
+It goes from map to map as the rule does, and where it cannot be sure it takes the answer that refutes less: what a body may
+have reached it has reached, and what may be in doubt is. What is left is an obstacle in any case.
+"""
+from dataclasses import replace
+
+import numpy as np
+
+import placed
+import touches
+from came import NotCovered
+from placed import NS, Unknown
+
+MOST_VOXELS = 4000000
+NONE = np.empty(0, np.int64)
+
+
+def packed(keys):
+    keys = np.asarray(keys, np.int64)
+    return keys[:, 0] << 32 | keys[:, 1] << 16 | keys[:, 2]
+
+
+def unpacked(numbers):
+    return np.stack([numbers >> 32, numbers >> 16 & 0xffff, numbers & 0xffff], 1)
+
+
+def voxels(corners, sizes, low, high):
+    """The finest voxels of leaves within a box of keys, as numbers."""
+    found = [NONE]
+    low, high = np.maximum(corners, low), np.minimum(corners + sizes[:, None], high)
+    some = (low < high).all(1)
+    if (high - low)[some].astype(float).prod(1).sum() > MOST_VOXELS:
+        raise NotCovered('more than %d voxels of a map near the bodies' % MOST_VOXELS)
+    single = some & (sizes == 1)
+    found.append(packed(corners[single]))
+    for l, h in zip(low[some & ~single], high[some & ~single]):
+        found.append(packed(np.stack(np.meshgrid(*map(np.arange, l, h), indexing='ij'), -1).reshape(-1, 3)))
+    return np.concatenate(found)
+
+
+def shown(leaves, numbers):
+    """Which of the voxels lie in one of the leaves."""
+    corners, sizes = leaves
+    found, keys = np.zeros(len(numbers), bool), unpacked(numbers)
+    for size in np.unique(sizes):
+        found |= np.isin(packed(keys // size * size), packed(corners[sizes == size]))
+    return found
+
+
+def less(map_, numbers):
+    """The map without these voxels."""
+    if not len(numbers):
+        return map_
+    corners, sizes = map_.leaves
+    hit = np.zeros(len(sizes), bool)
+    for size in np.unique(sizes):
+        mine = sizes == size
+        hit[mine] = np.isin(packed(corners[mine]), packed(unpacked(numbers) // size * size))
+    rest = voxels(corners[hit], sizes[hit], 0, 65536)
+    rest = unpacked(rest[~np.isin(rest, numbers)])
+    return replace(map_, corners=np.concatenate([corners[~hit], rest]), sizes=np.append(sizes[~hit], np.ones(len(rest), int)))
+
+
+def with_unknown(map_, box):
+    """The map, in which each voxel wholly within the box of which it tells nothing is an obstacle."""
+    low, high = (np.array(box[i:i + 3]) / map_.resolution + 32768 for i in (0, 3))
+    every = voxels(np.zeros((1, 3), int), np.array([65536]), np.ceil(low - 1e-6).astype(int), np.floor(high + 1e-6).astype(int))
+    unknown = unpacked(every[~shown(map_.leaves, every) & ~shown(map_.free, every)])
+    return replace(map_, corners=np.concatenate([map_.corners, unknown]), sizes=np.append(map_.sizes, np.ones(len(unknown), int)))
+
+
+class Owned:
+    """reach: by name, how near a voxel is to be [m]; 'auto' for the edge of one."""
+
+    def __init__(self, world, reach, lag, trust):
+        self.world, self.reach, self.lag, self.trust = world, reach, int(lag * NS), trust
+        self.of = {}  # by the map's number: what may be own, what may be in doubt
+        self.every = {name: list(self.places(name)) for name in reach}
+        if any(self.every.values()):
+            (self.follow_clouds if world.clouds else self.follow)()
+
+    def places(self, name):
+        """A body at all times at which tf has a place for it: stamp, vertices, surface."""
+        track, w = self.world.tracks[name], self.world
+        frames = [(f.stamp, f.frame, f.positions, f.surface) for f in getattr(track, 'every', [])]
+        if isinstance(track, placed.Rigid):
+            # A step takes it where tf has it at the clock's frames, and looks at tf's samples in between.
+            stamps = {f.stamp for f in getattr(w.tracks.get(w.clock_body), 'every', [])}
+            stamps |= {sample.stamp for samples in w.transforms.samples.values() for sample in samples}
+            frames = [(stamp, track.frame, track.positions, track.mesh) for stamp in stamps]
+        for stamp, frame, points, surface in sorted(frames, key=lambda f: f[0]):
+            try:
+                yield stamp, placed.carried(w.transforms.pose(frame, w.fixed, stamp), points), surface
+            except (Unknown, NotCovered):
+                pass  # it has no place there for anybody
+
+    def ways(self, name, begin, end):
+        """Straight ways between places: the vertices at both ends, the surface. A static body is where each frame has it at all times."""
+        every, times = self.every[name], [stamp for stamp, _, _ in self.every[name]]
+        if not self.world.tracks[name].moves:
+            return [(points, points, surface) for _, points, surface in every]
+        first, last = np.searchsorted(times, begin, 'right') - 1, np.searchsorted(times, end, 'left') + 1
+        some = every[max(0, first):last]
+        joined = [(p, q, surface) for (_, p, _), (_, q, surface) in zip(some, some[1:]) if p.shape == q.shape]
+        return joined + [(points, points, surface) for _, points, surface in some]
+
+    def reached(self, name, numbers, ways, back, reach, resolution, sure=False):
+        """Which voxels come within reach; `sure`: only those that the monitor certainly finds."""
+        found = np.zeros(len(numbers), bool)
+        middle = (unpacked(numbers) - 32767.5) * resolution
+        tolerance = self.world.params.get('rigid_tolerance_m', 1e-3) + 1e-6
+        solid = isinstance(self.world.tracks[name], placed.Rigid) and not sure
+        for p, q, surface in ways:
+            elements = surface.faces if len(surface.faces) else surface.edges[:, [0, 1, 1]]
+            p, q = placed.carried(back, p), placed.carried(back, q)
+            far = np.nanmax(np.linalg.norm(q - p, axis=1), initial=0)
+            many = 0 if far == 0 else 1 if sure else 1 + int(min(64, 4 * far / resolution))
+            within = reach - resolution / 2 - tolerance if sure else reach + 0.8661 * resolution + far / max(1, many) + tolerance
+            for i in range(many + 1):
+                at = (p + (q - p) * (i / max(1, many)))[elements]
+                at = at[np.isfinite(at).all((1, 2))]
+                left = np.nonzero(~found)[0]
+                if not len(at) or not len(left):
+                    continue
+                which = touches.overlapping(middle[left] - within, middle[left] + within, at.min(1), at.max(1))
+                near = touches.point_to_face(middle[left[which[:, 0]]], at[which[:, 1]]) <= within
+                found[left[which[near, 0]]] = True
+                if solid and surface.closed:
+                    found[left] |= ((middle[left] >= at.min((0, 1))) & (middle[left] <= at.max((0, 1)))).all(1)
+        return found
+
+    def follow(self):
+        w, before, own, doubt, remembered, missed = self.world, None, NONE, NONE, NONE, False
+        ends = np.concatenate([points for places in self.every.values() for _, points, _ in places])
+        box = np.stack(np.meshgrid(*zip(np.nanmin(ends, 0), np.nanmax(ends, 0))), -1).reshape(-1, 3)
+        for m in w.maps:
+            if m.problem:
+                missed = True
+                continue
+            if before is not None and m.stamp < before.stamp:
+                raise NotCovered('maps whose stamps go back, and own voxels')
+            if before is not None and (m.frame, m.resolution) != (before.frame, before.resolution):
+                before, own, doubt, remembered = None, NONE, NONE, NONE
+            pose = w.transforms.pose(m.frame or w.fixed, w.fixed, w.placed_at(m))
+            back = None if pose is None else np.linalg.inv(pose)
+            reach = {name: m.resolution if r == 'auto' else r for name, r in self.reach.items()}
+            more, corners = max(reach.values()) + 2 * m.resolution, placed.carried(back, box)
+            low, high = (np.floor(x / m.resolution).astype(int) + 32768 for x in (corners.min(0) - more, corners.max(0) + more))
+            fresh, gone = voxels(*m.leaves, low, high), remembered
+            if before is not None:
+                vanished = voxels(*before.leaves, low, high)
+                gone = np.concatenate([gone, vanished[~np.isin(vanished, np.concatenate([own, doubt]))]])
+                fresh = fresh[~shown(before.leaves, fresh)]
+            fresh, gone = fresh[~np.isin(fresh, remembered)], gone[~shown(m.leaves, gone)]
+            lasts = ~shown(m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
+            own, doubt = own[shown(m.leaves, own)], doubt[shown(m.leaves, doubt)]
+            for name in self.every:
+                ways = self.ways(name, (m if before is None else before).stamp - self.lag, m.stamp)
+                near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]
+                is_known = before is not None and not missed and (not w.tracks[name].moves or self.since(name) <= m.stamp)
+                if is_known or self.trust:
+                    own = np.union1d(own, near)
+                else:
+                    doubt = np.union1d(doubt, near)
+                lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
+            if missed and not self.trust:
+                own, doubt = NONE, np.union1d(own, doubt)
+            self.of[m.number] = own, doubt
+            remembered, before, missed = gone[lasts], m, False
+
+    def follow_clouds(self):
+        """What no body ever reached until then is none's own, however often it was seen free before."""
+        seen, ever, begin = NONE, np.zeros(0, bool), 0
+        for m in self.world.maps:
+            pose = self.world.transforms.pose(m.frame, self.world.fixed, m.stamp)
+            back = None if pose is None else np.linalg.inv(pose)
+            fresh = np.setdiff1d(packed(m.corners), seen)
+            asked = [(np.concatenate([seen, fresh]), begin - self.lag), (fresh, 0)]
+            ever = np.append(ever, np.zeros(len(fresh), bool))
+            for numbers, since in asked:
+                for name, r in self.reach.items():
+                    ways = self.ways(name, since, m.stamp)
+                    ever[len(ever) - len(numbers):] |= self.reached(name, numbers, ways, back, m.resolution if r == 'auto' else r, m.resolution)
+            seen, begin = asked[0][0], m.stamp
+            self.of[m.number] = seen[ever], NONE
+
+    def since(self, name):
+        """From when on its place is known; of a rigid body from the clock's first frame on."""
+        w = self.world
+        frames = getattr(w.tracks[name], 'every', None) or getattr(w.tracks.get(w.clock_body), 'every', [])
+        return min((f.stamp for f in frames), default=0)
