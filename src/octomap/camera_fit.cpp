@@ -5,6 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "simd/point_places.h"
+
 namespace dccd {
 namespace {
 
@@ -66,16 +68,8 @@ std::optional<FittedCamera> fitCamera(const SensorView& view, double nearest_m) 
   const Eigen::Vector3d to_u = camera.lens.fx * a + camera.lens.cx * c,
                         to_v = camera.lens.fy * down + camera.lens.cy * c;
   for (std::size_t v = 0; v < view.height; ++v) {
-    double off = 0;
-    for (std::size_t u = 0; u < view.width; ++u) {
-      const float* p = pointAt(u, v);
-      if (!counts(p, nearest2)) continue;
-      const double x = p[0], y = p[1], z = p[2], depth = c[0] * x + c[1] * y + c[2] * z, inverse = 1 / depth;
-      const double off_u = std::abs((to_u[0] * x + to_u[1] * y + to_u[2] * z) * inverse - double(u));
-      const double off_v = std::abs((to_v[0] * x + to_v[1] * y + to_v[2] * z) * inverse - double(v));
-      off = std::max(off, depth > 0 ? std::max(off_u, off_v) : 2 * MOST_OFF_PX);
-    }
-    camera.off_px = std::max(camera.off_px, off);
+    const simd::PixelRow row{pointAt(0, v), view.width, double(v), nearest2};
+    camera.off_px = std::max(camera.off_px, simd::mostOffPx(row, to_u.data(), to_v.data(), c.data()));
     if (!(camera.off_px <= MOST_OFF_PX)) return std::nullopt;
   }
   return camera;

@@ -127,17 +127,19 @@ Seen DepthPicture::look(const OctreeCube& cube) {
   while (((area_.u1 >> level) - (area_.u0 >> level)) > 2 || ((area_.v1 >> level) - (area_.v0 >> level)) > 2) ++level;
   const Level& squares = levels_[level];
   const float* const last = level == 0 ? squares.nearest.data() : squares.farthest.data();
-  float least = NOWHERE, most = -NOWHERE;
-  int hole = 0;
-  for (std::int32_t v = area_.v0 >> level; v <= area_.v1 >> level; ++v) {
-    const std::size_t row = static_cast<std::size_t>(v) * squares.width;
-    for (std::int32_t u = area_.u0 >> level; u <= area_.u1 >> level; ++u) {
-      least = squares.nearest[row + u] < least ? squares.nearest[row + u] : least;
-      most = last[row + u] > most ? last[row + u] : most;
-      if (has_holes_) hole = std::max<int>(hole, squares.hole[row + u]);
-    }
+  // Always three by three, some more than once: processors guess badly how many there are of each cube.
+  const std::int32_t u0 = area_.u0 >> level, u1 = area_.u1 >> level, v0 = area_.v0 >> level, v1 = area_.v1 >> level;
+  std::size_t at_squares[9];
+  for (std::int32_t i = 0; i < 9; ++i) {
+    const std::int32_t v = std::min(v0 + i / 3, v1), u = std::min(u0 + i % 3, u1);
+    at_squares[i] = static_cast<std::size_t>(v) * squares.width + u;
   }
+  float least = NOWHERE, most = -NOWHERE;
+  for (const std::size_t i : at_squares) most = last[i] > most ? last[i] : most;
   if (static_cast<double>(most) < nearest) return Seen::NONE;
+  for (const std::size_t i : at_squares) least = squares.nearest[i] < least ? squares.nearest[i] : least;
+  int hole = 0;
+  for (int i = 0; has_holes_ && i < 9; ++i) hole = std::max<int>(hole, squares.hole[at_squares[i]]);
   nearest_m_ = nearest;
   farthest_m_ = farthest;
   const double side = square_px_ / farthest - 2 * off;
@@ -186,14 +188,10 @@ bool DepthPicture::crosses(const OctreeCube& cube) const {
       const float x0 = lo[0] * x, x1 = hi[0] * x, y0 = lo[1] * y, y1 = hi[1] * y, z0 = lo[2] * z, z1 = hi[2] * z;
       const float enters = std::max(std::max(std::min(x0, x1), std::min(y0, y1)), std::min(z0, z1));
       const float leaves = std::min(std::min(std::max(x0, x1), std::max(y0, y1)), std::max(z0, z1));
-      return static_cast<int>(enters <= leaves) & static_cast<int>(depths[i] > nearest) &
-             static_cast<int>(depths[i] >= enters);
+      return enters <= leaves && depths[i] >= enters;
     };
-    const std::int32_t count = area_.u1 - area_.u0 + 1;
-    int any = 0;
-    for (std::int32_t i = 0; i < count; ++i) any |= reaches(i);
-    for (std::int32_t i = 0; any != 0 && i < count; ++i) {
-      if (reaches(i) == 0) continue;
+    for (std::int32_t i = 0; i <= area_.u1 - area_.u0; ++i) {
+      if (!(depths[i] > nearest) || !reaches(i)) continue;
       if (passes(area_.u0 + i, v, cube)) return true;
       if (++tried == MOST_TRIED) return false;
     }

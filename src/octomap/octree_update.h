@@ -81,14 +81,15 @@ class OctreeUpdate {
    public:
     Range(const std::vector<OccupiedLeaf>& from, std::vector<OccupiedLeaf>& to) : from_(from), to_(to) {
       to_.reserve(from.size() + from.size() / 16);
+      goTo(0);
     }
     bool isIn(const OctreeCube& cube) {
       keepBefore(cube.code);
-      return next_ < from_.size() && cube.holds(from_[next_]);
+      return next_code_ < cube.end();
     }
     void skip(const OctreeCube& cube) {
       keepBefore(cube.code);
-      while (next_ < from_.size() && cube.holds(from_[next_])) ++next_;
+      while (next_code_ < cube.end()) goTo(next_ + 1);
     }
     /// Behind all that was listed so far.
     void list(const OctreeCube& cube) {
@@ -100,13 +101,19 @@ class OctreeUpdate {
       skip(cube);
       while (!to_.empty() && cube.holds(to_.back())) to_.pop_back();
     }
-    void keepAll() { keepBefore(~std::uint64_t{0}); }
+    void keepAll() { keepBefore(NO_CODE); }
 
    private:
     const std::vector<OccupiedLeaf>& from_;
     std::vector<OccupiedLeaf>& to_;
     std::size_t next_ = 0;
+    std::uint64_t next_code_ = 0;  // that leaf's; behind the last one NO_CODE
 
+    static constexpr std::uint64_t NO_CODE = ~std::uint64_t{0};
+    void goTo(std::size_t next) {
+      next_ = next;
+      next_code_ = next < from_.size() ? codeOf(from_[next]) : NO_CODE;
+    }
     void keepBefore(std::uint64_t code);
   };
 
@@ -259,6 +266,7 @@ class OctreeUpdate {
 
 template <class Look>
 void OctreeUpdate<Look>::Range::keepBefore(std::uint64_t code) {
+  if (next_code_ >= code) return;
   const auto isBefore = [&](const OccupiedLeaf& leaf) { return codeOf(leaf) < code; };
   // Most times there are few.
   std::size_t end = next_, step = 1;
@@ -269,7 +277,7 @@ void OctreeUpdate<Look>::Range::keepBefore(std::uint64_t code) {
   const auto first = from_.begin() + static_cast<std::ptrdiff_t>(next_);
   const auto last = std::partition_point(first, from_.begin() + static_cast<std::ptrdiff_t>(end), isBefore);
   to_.insert(to_.end(), first, last);
-  next_ = static_cast<std::size_t>(last - from_.begin());
+  goTo(static_cast<std::size_t>(last - from_.begin()));
 }
 
 }  // namespace dccd

@@ -99,8 +99,9 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
       last[0] = x, last[1] = y, last[2] = z;
       last_fills = !is_far;
       const auto bits = [](std::int32_t key) { return static_cast<std::uint32_t>(key); };
-      const std::uint64_t word = endWord(mortonCode(bits(x), bits(y), bits(z)), !is_far);
-      if (isNew(~word)) ends.push_back(word);
+      const std::uint64_t packed = bits(x) | std::uint64_t{bits(y)} << 16 | std::uint64_t{bits(z)} << 32;
+      if (!isNew(packed << 1 | (is_far ? 1u : 0u))) continue;
+      ends.push_back(endWord(mortonCode(bits(x), bits(y), bits(z)), !is_far));
     }
   }
 }

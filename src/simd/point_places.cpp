@@ -12,6 +12,7 @@ HWY_BEFORE_NAMESPACE();
 namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
 
 void locateAxis(const double* HWY_RESTRICT place, size_t count, double sensor, double lo, double hi,
                 int32_t* HWY_RESTRICT key, int32_t* HWY_RESTRICT is_in) {
@@ -88,6 +89,45 @@ void PlacePoints(const float* HWY_RESTRICT xyz, const double* HWY_RESTRICT m, co
   locate(limits, places);
 }
 
+template <class D>
+hn::Vec<D> along(const double* way, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) {
+  const D d;
+  const auto xy = hn::Add(hn::Mul(hn::Set(d, way[0]), x), hn::Mul(hn::Set(d, way[1]), y));
+  return hn::Add(xy, hn::Mul(hn::Set(d, way[2]), z));
+}
+
+/// For rows of at least as many points as a vector has lanes.
+template <class D>
+double mostOff(D d, const PixelRow& row, const double* to_u, const double* to_v, const double* ahead) {
+  const hn::Rebind<float, D> floats;
+  const size_t lanes = hn::Lanes(d);
+  const auto infinite = hn::Set(d, std::numeric_limits<double>::infinity()), zero = hn::Zero(d);
+  auto most = zero;
+  for (size_t next = 0; next < row.width; next += lanes) {
+    const size_t i = next + lanes <= row.width ? next : row.width - lanes;  // some twice
+    hn::Vec<decltype(floats)> px, py, pz;
+    hn::LoadInterleaved3(floats, row.xyz + 3 * i, px, py, pz);
+    const auto x = hn::PromoteTo(d, px), y = hn::PromoteTo(d, py), z = hn::PromoteTo(d, pz);
+    const auto square = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
+    const auto is_far = hn::And(hn::Gt(square, zero), hn::Ge(square, hn::Set(d, row.nearest2)));
+    const auto counts = hn::And(is_far, hn::Lt(square, infinite));
+    const auto depth = along<D>(ahead, x, y, z), inverse = hn::Div(hn::Set(d, 1.0), depth);
+    const auto u = hn::Iota(d, static_cast<double>(i)), v = hn::Set(d, row.v);
+    const auto off_u = hn::Abs(hn::Sub(hn::Mul(along<D>(to_u, x, y, z), inverse), u));
+    const auto off_v = hn::Abs(hn::Sub(hn::Mul(along<D>(to_v, x, y, z), inverse), v));
+    const auto larger = hn::IfThenElse(hn::Lt(off_u, off_v), off_v, off_u);
+    const auto off = hn::IfThenElse(hn::Gt(depth, zero), larger, infinite);
+    most = hn::IfThenElse(hn::And(counts, hn::Lt(most, off)), off, most);
+  }
+  return hn::GetLane(hn::MaxOfLanes(d, most));
+}
+
+double MostOffPx(const PixelRow& row, const double* to_u, const double* to_v, const double* ahead) {
+  const hn::ScalableTag<double> d;
+  if (row.width >= hn::Lanes(d)) return mostOff(d, row, to_u, to_v, ahead);
+  return mostOff(hn::CappedTag<double, 1>(), row, to_u, to_v, ahead);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
 }  // namespace dccd
@@ -99,6 +139,7 @@ namespace simd {
 
 HWY_EXPORT(PlaceDepths);
 HWY_EXPORT(PlacePoints);
+HWY_EXPORT(MostOffPx);
 
 void placeDepths(const float* depth_m, const double* first, const double* right, const PlaceLimits& limits,
                  PointPlaces& places) {
@@ -108,6 +149,10 @@ void placeDepths(const float* depth_m, const double* first, const double* right,
 void placePoints(const float* xyz, const double* from_sensor, const double* ahead, const PlaceLimits& limits,
                  PointPlaces& places) {
   HWY_DYNAMIC_DISPATCH(PlacePoints)(xyz, from_sensor, ahead, limits, places);
+}
+
+double mostOffPx(const PixelRow& row, const double* to_u, const double* to_v, const double* ahead) {
+  return HWY_DYNAMIC_DISPATCH(MostOffPx)(row, to_u, to_v, ahead);
 }
 
 }  // namespace simd

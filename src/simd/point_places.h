@@ -36,5 +36,17 @@ DCCD_EXPORT void placeDepths(const float* depth_m, const double* first, const do
 DCCD_EXPORT void placePoints(const float* xyz, const double* from_sensor, const double* ahead,
                              const PlaceLimits& limits, PointPlaces& places);
 
+/// A row of points in a picture's order. Those nearer than that and those that are not finite do not count.
+struct PixelRow {
+  const float* xyz;
+  std::size_t width;  ///< at least 1
+  double v;           ///< the row's number
+  double nearest2;    ///< square of a distance from the camera
+};
+
+/// [px] So far at most is a point that counts from its pixel, along u or v; infinite where one is not ahead. Pixels are
+/// `to_u` and `to_v` of a point by its depth, which is along `ahead`.
+DCCD_EXPORT double mostOffPx(const PixelRow& row, const double* to_u, const double* to_v, const double* ahead);
+
 }  // namespace simd
 }  // namespace dccd

@@ -124,6 +124,36 @@ TEST(PointPlaces, OfPointsAreThoseOfPlainNumbersOnEachTarget) {
   }
 }
 
+/// A camera's rows; of fewer points than vectors have lanes, too. The one that is off the most may be any of them.
+TEST(PointPlaces, OffItsPixelIsAPointAsInPlainNumbersOnEachTarget) {
+  const Eigen::Vector3d to_u(80.5, 0.3, 31), to_v(-0.2, 79, 17), ahead(0.01, -0.02, 0.999);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (const std::size_t width : {1, 2, 3, 7, 8, 9, 64, 161}) {
+    for (int round = 0; round < 40; ++round) {
+      std::vector<float> xyz(3 * width);
+      double expected = 0;
+      for (std::size_t u = 0; u < width; ++u) {
+        const float z = 0.05f + unit(random), far = unit(random) < 0.1f ? 0.3f : 0.001f;
+        float p[3] = {z * ((float(u) - 31) / 80.5f + far * unit(random)), z * (-13.0f / 79 + far * unit(random)), z};
+        if (unit(random) < 0.1f) p[2] = unit(random) < 0.5f ? NOTHING : INFINITE;
+        if (round % 8 == 7 && u == width / 2) p[2] = -z;  // behind
+        std::copy(p, p + 3, &xyz[3 * u]);
+        const double x = p[0], y = p[1], depth_z = p[2], square = x * x + y * y + depth_z * depth_z;
+        if (!std::isfinite(square) || square < 0.04) continue;
+        const auto along = [&](const Eigen::Vector3d& way) { return way[0] * x + way[1] * y + way[2] * depth_z; };
+        const double inverse = 1 / along(ahead);
+        const double off = std::max(std::abs(along(to_u) * inverse - double(u)), std::abs(along(to_v) * inverse - 4.0));
+        expected = std::max(expected, along(ahead) > 0 ? off : std::numeric_limits<double>::infinity());
+      }
+      test::forEachTarget([&](const std::string& target) {
+        const PixelRow row{xyz.data(), width, 4, 0.04};
+        EXPECT_EQ(mostOffPx(row, to_u.data(), to_v.data(), ahead.data()), expected) << target << ' ' << width;
+      });
+    }
+  }
+}
+
 }  // namespace
 }  // namespace simd
 }  // namespace dccd
