@@ -44,6 +44,24 @@ static_assert(tolerance::MAP_NODE >=
               "");
 static_assert(tolerance::MAP_NODE_BUILDING >= tolerance::MAP_NODE + 2 * sizeof(std::uint64_t), "");
 
+/// Of a list that is two in Morton order, one behind the other, as what is occupied and what is free: both in one. Of
+/// others the leaves in some order.
+std::vector<OccupiedLeaf> merged(const std::vector<OccupiedLeaf>& leaves) {
+  std::vector<OccupiedLeaf> list;
+  list.reserve(leaves.size());
+  const auto isAfter = [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return codeOf(a) > codeOf(b); };
+  const auto last = std::adjacent_find(leaves.begin(), leaves.end(), isAfter);
+  auto one = leaves.begin();
+  const auto middle = last == leaves.end() ? last : last + 1;
+  for (auto other = middle; other != leaves.end(); ++other) {
+    const std::uint64_t code = codeOf(*other);
+    while (one != middle && codeOf(*one) < code) list.push_back(*one++);
+    list.push_back(*other);
+  }
+  list.insert(list.end(), one, middle);
+  return list;
+}
+
 std::vector<OccupiedLeaf> sorted(const std::vector<OccupiedLeaf>& leaves) {
   std::vector<CodedLeaf> order(leaves.size());
   for (std::size_t i = 0; i < leaves.size(); ++i) order[i] = {codeOf(leaves[i]), static_cast<std::uint32_t>(i)};
@@ -60,7 +78,7 @@ std::vector<OccupiedLeaf> sorted(const std::vector<OccupiedLeaf>& leaves) {
 
 VoxelTree::VoxelTree(const std::vector<OccupiedLeaf>& leaves) {
   if (leaves.size() >= NONE) throw std::invalid_argument("too many leaves: " + std::to_string(leaves.size()));
-  if (!takeSorted(leaves)) takeSorted(sorted(leaves));
+  if (!takeSorted(leaves) && !takeSorted(merged(leaves))) takeSorted(sorted(leaves));
   if (leaves_.empty()) return;
   std::vector<std::uint64_t> prefixes;
   for (int level = 0; level < LEVELS; ++level) buildLevel(level, prefixes);

@@ -152,7 +152,7 @@ void Monitor::Impl::settleDoubt(Step& step, const Deadline& deadline) {
   asked.map.surface = asked.map.own.doubted_surface;
   for (Body& body : asked.bodies) body.self_collision = body.against_bodies = false;
   Options how = options.detector;
-  how.check_start_state = how.patches = how.suppress_initial = false;
+  how.check_start_state = how.patches = how.suppress_initial = how.clearance.wanted = false;
   how.expected.clear();
   how.exclude_boxes.clear();
   const Outcome outcome = detect(asked, how, doubt_history, deadline);

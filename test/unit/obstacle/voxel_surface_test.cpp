@@ -219,6 +219,35 @@ TEST(VoxelSurface, RefusesWhatIsNoMapAndNamesIt) {
   EXPECT_NE(refusal(1, {leafAt(63, 63, 63, 1), leafAt(0, 0, 0, 64)}).find("overlaps"), std::string::npos);
 }
 
+/// One behind the other as what is occupied and what is free, each in order: as if they were mixed up.
+TEST(VoxelSurface, TwoListsInOrderMakeTheTreeThatTheirLeavesMake) {
+  std::mt19937 random(5);
+  const auto isBefore = [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return codeOf(a) < codeOf(b); };
+  for (int round = 0; round < 100; ++round) {
+    std::vector<OccupiedLeaf> mixed = randomLeaves(random, 32768 - 16, 48, 5 + round);
+    std::vector<OccupiedLeaf> lists = mixed;
+    const auto middle = lists.begin() + static_cast<std::ptrdiff_t>(random() % (lists.size() + 1));
+    std::sort(lists.begin(), middle, isBefore);
+    std::sort(middle, lists.end(), isBefore);
+    const VoxelTree one(lists), other(mixed);
+    ASSERT_TRUE(std::equal(
+        one.leaves().begin(), one.leaves().end(), other.leaves().begin(), other.leaves().end(),
+        [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return a.size == b.size && codeOf(a) == codeOf(b); }));
+    for (int level = 0; level < VoxelTree::LEVELS; ++level) {
+      ASSERT_EQ(one.nodes(level).size(), other.nodes(level).size());
+      for (std::uint32_t n = 0; n < one.nodes(level).size(); ++n) {
+        const VoxelTree::Node &a = one.nodes(level)[n], &b = other.nodes(level)[n];
+        ASSERT_EQ(one.nodeCell(level, n), other.nodeCell(level, n));
+        ASSERT_TRUE(a.full == b.full && a.start == b.start && a.child == b.child && a.first_leaf == b.first_leaf &&
+                    a.first_child == b.first_child);
+      }
+    }
+    // One that the second list has once more is no set of leaves.
+    lists.push_back(lists[random() % lists.size()]);
+    EXPECT_THROW(VoxelTree{lists}, std::invalid_argument) << round;
+  }
+}
+
 TEST(VoxelSurface, MemoryIsProportional) {
   std::vector<OccupiedLeaf> leaves;
   for (int x = 0; x < 300; ++x) {
