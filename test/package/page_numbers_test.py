@@ -68,7 +68,7 @@ NUMBERS = {
     'doc/guarantees.md': [
         (r'([\d,]+) names of frames', lambda: constant('src/input/transforms.h', 'MAX_FRAMES')),
         (r'([\d,]+) transforms in 10 s', lambda: constant('src/input/transforms.h', 'MAX_KEPT')),
-        (r'own queue of (\d+) messages', lambda: constant('src/input/mesh_subscription.cpp', 'SUBSCRIBER_QUEUE')),
+        (r'own queue of (\d+) messages', lambda: constant('src/input/watched_queue.h', 'SUBSCRIBER_QUEUE')),
         (r'DAE at most ([\d,]+) tags', lambda: constant('src/input/dae_file.cpp', 'MOST_MARKS')),
         (r'told to stop; ([\d.]+) s after', lambda: constant('src/node/collision_monitor.cpp', 'END_AFTER') / 1000),
     ],
