@@ -98,6 +98,7 @@ struct Monitor::Impl {
   static void sayUnknown(const std::string& name, const std::string& why, Step& step);
   void lookBetween(std::size_t body, Step& step) const;
   std::vector<Knot> trackOf(const MeshFrame& from, const MeshFrame& to, std::string& why) const;
+  std::shared_ptr<const MeshFrame> frameAt(std::size_t body, StampNs stamp_ns, Step& step) const;
   bool findPlaces(const MeshStore::Stretch& stretch, const Step& step, const Body& body, std::vector<Waypoint>& places,
                   std::string& why) const;
   /// The body's waypoints; stretches: its frames in and around the step, oldest first.

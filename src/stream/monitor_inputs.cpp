@@ -171,6 +171,26 @@ std::vector<Knot> Monitor::Impl::trackOf(const MeshFrame& from, const MeshFrame&
   return why.empty() ? knots : std::vector<Knot>();
 }
 
+/// The body's frame at the stamp, or where it is between two: on the way of what carries them.
+std::shared_ptr<const MeshFrame> Monitor::Impl::frameAt(std::size_t b, StampNs stamp_ns, Step& step) const {
+  const std::shared_ptr<const MeshFrame> straight = stores[b].frameAt(stamp_ns);
+  for (const MeshStore::Stretch& stretch : stores[b].pathWithin(stamp_ns, stamp_ns)) {
+    const MeshFrame &from = *stretch.from, &to = *stretch.to;
+    const std::string& carrier = to.carrier.frame;
+    if (!tracks || to.rigid || carrier.empty() || from.carrier.frame != carrier) continue;
+    if (stamp_ns <= from.stamp_ns || stamp_ns >= to.stamp_ns) continue;
+    const std::vector<Knot> track = tracks->between({}, carrier, from.stamp_ns, stamp_ns, to.carrier.silence);
+    if (track.empty()) continue;
+    const Knot first{from.stamp_ns, from.pose}, here = track.back(), last{to.stamp_ns, to.pose};
+    if (!here.why_unknown.empty()) sayUnknown("body '" + bodies[b].name + "'", here.why_unknown, step);
+    if (standsStill({first, here, last})) continue;
+    MeshFrame carried = *straight;
+    carried.positions = carriedTo(here, first, last, from.positions, to.positions);
+    return std::make_shared<const MeshFrame>(std::move(carried));
+  }
+  return straight;
+}
+
 /// Where the body is between two of its frames: at the knots of what carries it, and at more of them until what is
 /// between leaves the way from one to the next by a quarter of the tolerance. A middle that is off by d leaves d / 4,
 /// for between two samples of tf joints turn evenly. False: it is not known, or not followed so far.
@@ -310,7 +330,7 @@ Step Monitor::Impl::place(const Pending& pending) {
       placeBetween(pending.from, pending.to, body);
       follow(b, {{pending.from, pending.to, 0, 1}}, step);
     } else {
-      placeBetween(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
+      placeBetween(frameAt(b, step.start_ns, step), frameAt(b, step.stamp_ns, step), body);
       lookBetween(b, step);
       auto stretches = stores[b].pathWithin(step.start_ns + 1, step.stamp_ns - 1);
       std::reverse(stretches.begin(), stretches.end());

@@ -20,6 +20,8 @@ def known():
 
 
 class StormTest(unittest.TestCase):
+    maxDiff = None
+
     def run_storm(self, folder, *calls):
         """Each call with a log of its own, at the same time."""
         logs = [folder / ('%d.log' % number) for number in range(len(calls))]

@@ -133,6 +133,27 @@ TEST_F(Tracks, WhatTurnsAboutAFarJointIsFollowedBetweenKnots) {
   }
 }
 
+// A step ends between two frames of a mesh that its frame swings on a lever of 1 m: where it is then the lever says,
+// not the chord between the two, which comes 123 mm nearer to the joint.
+TEST_F(Tracks, WhatIsCarriedIsOnItsWayWhereAStepEnds) {
+  for (const double height : {0.004, -0.004}) {
+    said.fixed_from["hand"] = [height](double t) {
+      const Eigen::AngleAxisd turn(10 * (t - 0.15), Vec3::UnitX());
+      return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1 + height) * turn * Eigen::Translation3d(0, 0, -1));
+    };
+    Monitor monitor(loose(), {named("floor"), named("tip")});
+    monitor.setTracks(&said);
+    for (const StampNs stamp_ns : {0, 100, 200, 300}) monitor.push(1, held(stamp_ns * MS), NOW);
+    monitor.push(0, clock(50 * MS), NOW);
+    only(monitor);
+    monitor.push(0, clock(150 * MS), NOW);
+    const Outcome outcome = only(monitor);
+    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+    EXPECT_NEAR((*outcome.step->bodies[1].t1)[0].z(), height, 1e-12);
+    EXPECT_EQ(assuranceOf(outcome).clear(), height > 0);
+  }
+}
+
 TEST_F(Tracks, WhereNobodyKnowsThatIsNoProof) {
   for (const bool is_rigid : {false, true}) {
     rigid = is_rigid;
