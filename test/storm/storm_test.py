@@ -11,7 +11,7 @@ import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
 LONG = os.environ.get('DEFORMABLE_CCD_LONG')
-WORLDS = int(os.environ.get('DEFORMABLE_CCD_STORM_WORLDS', 20000 if LONG else 200))
+WORLDS = int(os.environ.get('DEFORMABLE_CCD_STORM_WORLDS', 20000 if LONG else 150))
 
 
 def known():
