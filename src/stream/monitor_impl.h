@@ -1,5 +1,6 @@
 // What a monitor holds and does: monitor.cpp has its frames and steps, monitor_inputs.cpp what a step is made of
-// (bodies, references), monitor_maps.cpp its map, monitor_questions.cpp what is asked between steps.
+// (bodies, references), monitor_ways.cpp where they go in it, monitor_maps.cpp its map, monitor_questions.cpp what is
+// asked between steps.
 #pragma once
 
 #include <atomic>

@@ -1,18 +1,12 @@
 // What a step is made of: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
-#include <sstream>
 #include <utility>
 
-#include "step/parts.h"
 #include "stream/monitor_impl.h"
 #include "stream/radii.h"
 
 namespace dccd {
 namespace {
-
-constexpr double STILL = 1e-12;  // of a pose's numbers: what interpolating between two equal ones may round
-
-const char* const FORGOTTEN = "stamps of tf went back, or a static transform is another one";
 
 std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
   return radius_m.empty() ? nullptr : share(std::move(radius_m));
@@ -22,72 +16,7 @@ double largest(const std::vector<double>& values) {
   return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
 }
 
-double fractionOf(const Step& step, StampNs stamp_ns) {
-  return static_cast<double>(stamp_ns - step.start_ns) / static_cast<double>(step.stamp_ns - step.start_ns);
-}
-
-/// How far the two poses bring points within the bounds from each other: the most that they do its corners [m].
-double apart(const Eigen::Isometry3d& seen, const Eigen::Isometry3d& expected, const Eigen::AlignedBox3d& bounds) {
-  double off = 0;
-  if (bounds.isEmpty()) return off;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 p = bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));
-    off = std::max(off, (seen * p - expected * p).norm());
-  }
-  return off;
-}
-
-Eigen::AlignedBox3d boundsOf(const Body& body) {
-  Eigen::AlignedBox3d bounds;
-  for (const Positions* positions : {body.t0.get(), body.t1.get()}) {
-    for (const Vec3& p : *positions) {
-      if (p.allFinite()) bounds.extend(p);
-    }
-  }
-  return bounds;
-}
-
-Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
-  Eigen::AlignedBox3d bounds;
-  for (const Body& body : step.bodies) {
-    if (meetsMap(body)) bounds.extend(boundsOf(body));
-  }
-  return bounds;
-}
-
-/// Where vertices are at a knot between two frames, on the way of what carries them, on which they go straight. `first`
-/// and `last` are its poses at the two.
-Positions carriedTo(const Knot& knot, const Knot& first, const Knot& last, const Positions& from, const Positions& to) {
-  const double u =
-      static_cast<double>(knot.stamp_ns - first.stamp_ns) / static_cast<double>(last.stamp_ns - first.stamp_ns);
-  const Eigen::Isometry3d from_first = knot.pose * first.pose.inverse(), from_last = knot.pose * last.pose.inverse();
-  Positions carried(from.size());
-  for (std::size_t v = 0; v < from.size(); ++v) carried[v] = (1 - u) * (from_first * from[v]) + u * (from_last * to[v]);
-  return carried;
-}
-
-/// A frame that stands still, as a camera's on its mount, costs no look at the vertices.
-bool standsStill(const std::vector<Knot>& knots) {
-  return std::all_of(knots.begin(), knots.end(),
-                     [&](const Knot& knot) { return knot.pose.isApprox(knots.front().pose, STILL); });
-}
-
-/// Has the frame lost a vertex that is to be looked at?
-bool hasLost(const MeshFrame& frame, const Body& body) {
-  const std::vector<Index>& used = frame.topology->usedVertices();
-  return std::any_of(used.begin(), used.end(), [&](Index v) {
-    return !frame.positions[v].allFinite() &&
-           std::find(body.vertex_mask.begin(), body.vertex_mask.end(), v) == body.vertex_mask.end();
-  });
-}
-
-void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
-
 }  // namespace
-
-void Monitor::Impl::sayUnknown(const std::string& name, const std::string& why, Step& step) {
-  addSentence(step.off_path, "where " + name + " was is not known for all of this step (" + why + ")");
-}
 
 void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to,
                   Body& body) {
@@ -139,171 +68,6 @@ void Monitor::Impl::dropAtSeam(std::size_t body, Pending& step) {
   if (was_told) return;
   const StepStatus reason = stores[body].runReason();
   drop(step, reason, "body '" + bodies[body].name + "' began anew since the last step (" + toString(reason) + ")");
-}
-
-/// What was seen of the body between the step's ends must not be contradicted in silence: how uncertain it was, and
-/// what was missing of it.
-void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
-  Body& body = step.bodies[b];
-  bool lost = false;
-  for (const std::shared_ptr<const MeshFrame>& frame : stores[b].framesWithin(step.start_ns, step.stamp_ns)) {
-    lost = lost || hasLost(*frame, body);
-    if (!frame->radius_m.empty()) {
-      body.radius_m = radii(largerRadii(body.radius_m ? *body.radius_m : std::vector<double>(), frame->radius_m));
-    }
-    body.dropped_faces = std::max(body.dropped_faces, frame->dropped_faces);
-  }
-  if (lost) {
-    sayUnknown("body '" + body.name + "'", "a frame between its ends has lost vertices", step);
-  }
-}
-
-/// The track of what carries a body from one of its frames to the next. Empty: it stands still, or `why` says why it is
-/// not known.
-std::vector<Knot> Monitor::Impl::trackOf(const MeshFrame& from, const MeshFrame& to, std::string& why) const {
-  if (!tracks || (from.carrier.frame.empty() && to.carrier.frame.empty())) return {};
-  if (from.carrier.frame != to.carrier.frame) why = "the frame that carries it is another one than before";
-  if (from.carrier.epoch != tracks->epoch() || to.carrier.epoch != tracks->epoch()) why = FORGOTTEN;
-  if (!why.empty()) return {};
-  std::vector<Knot> knots = tracks->between({}, to.carrier.frame, from.stamp_ns, to.stamp_ns, to.carrier.silence);
-  const auto unknown = std::find_if(knots.begin(), knots.end(), [](const Knot& k) { return !k.why_unknown.empty(); });
-  if (unknown != knots.end()) why = unknown->why_unknown;
-  return why.empty() ? knots : std::vector<Knot>();
-}
-
-/// The body's frame at the stamp, or where it is between two: on the way of what carries them.
-std::shared_ptr<const MeshFrame> Monitor::Impl::frameAt(std::size_t b, StampNs stamp_ns, Step& step) const {
-  const std::shared_ptr<const MeshFrame> straight = stores[b].frameAt(stamp_ns);
-  for (const MeshStore::Stretch& stretch : stores[b].pathWithin(stamp_ns, stamp_ns)) {
-    const MeshFrame &from = *stretch.from, &to = *stretch.to;
-    const std::string& carrier = to.carrier.frame;
-    if (!tracks || to.rigid || carrier.empty() || from.carrier.frame != carrier) continue;
-    if (stamp_ns <= from.stamp_ns || stamp_ns >= to.stamp_ns) continue;
-    const std::vector<Knot> track = tracks->between({}, carrier, from.stamp_ns, stamp_ns, to.carrier.silence);
-    if (track.empty()) continue;
-    const Knot first{from.stamp_ns, from.pose}, here = track.back(), last{to.stamp_ns, to.pose};
-    if (!here.why_unknown.empty()) sayUnknown("body '" + bodies[b].name + "'", here.why_unknown, step);
-    if (standsStill({first, here, last})) continue;
-    MeshFrame carried = *straight;
-    carried.positions = carriedTo(here, first, last, from.positions, to.positions);
-    return std::make_shared<const MeshFrame>(std::move(carried));
-  }
-  return straight;
-}
-
-/// Where the body is between two of its frames: at the knots of what carries it, and at more of them until what is
-/// between leaves the way from one to the next by a quarter of the tolerance. A middle that is off by d leaves d / 4,
-/// for between two samples of tf joints turn evenly. False: it is not known, or not followed so far.
-bool Monitor::Impl::findPlaces(const MeshStore::Stretch& stretch, const Step& step, const Body& body,
-                               std::vector<Waypoint>& places, std::string& why) const {
-  const MeshFrame &from = *stretch.from, &to = *stretch.to;
-  std::vector<Knot> knots = trackOf(from, to, why);
-  if (!why.empty()) return false;
-  places.clear();
-  if (knots.empty() || standsStill(knots)) return true;
-  const Knot first = knots.front(), last = knots.back();
-  const auto placeAt = [&](const Knot& knot) {
-    return Waypoint{fractionOf(step, knot.stamp_ns), knot.pose * first.pose.inverse() * from.pose,
-                    body.turns ? nullptr : share(carriedTo(knot, first, last, from.positions, to.positions))};
-  };
-  const WayBends bends(body);
-  const double tolerance_m = options.detector.rigid_tolerance_m;
-  bool is_fine = false;
-  for (int round = 0; !is_fine && knots.size() <= tolerance::MOST_POSES_A_STEP; ++round) {
-    is_fine = true;
-    std::vector<Knot> finer;
-    for (std::size_t k = 0; k < knots.size(); ++k) {
-      Knot& knot = knots[k];
-      if (!knot.is_middle || bends.at(placeAt(knots[k - 1]), placeAt(knot), placeAt(knots[k + 1])) <= tolerance_m) {
-        finer.push_back(knot);
-        continue;
-      }
-      is_fine = false;
-      knot.is_middle = false;
-      for (const std::size_t side : {k - 1, k}) {
-        const std::vector<Knot> half =
-            tracks->between({}, to.carrier.frame, knots[side].stamp_ns, knots[side + 1].stamp_ns, to.carrier.silence);
-        if (side == k) finer.push_back(knot);
-        if (half.size() > 2) finer.insert(finer.end(), half.begin() + 1, half.end() - 1);
-      }
-    }
-    knots = std::move(finer);
-  }
-  if (!is_fine) why = "its way bends too much between two transforms";
-  for (const Knot& knot : knots) {
-    if (!knot.why_unknown.empty()) why = knot.why_unknown;
-    places.push_back(placeAt(knot));
-  }
-  return why.empty();
-}
-
-/// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it; a
-/// rigid body is carried as it is. Where that leaves the way from the step's start to its end, it becomes waypoints.
-void Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>& stretches, Step& step) const {
-  Body& body = step.bodies[b];
-  std::vector<Waypoint> waypoints, places;
-  const auto add = [&](const Waypoint& place) {
-    if (place.u > 0 && place.u < 1 && (waypoints.empty() || place.u > waypoints.back().u)) waypoints.push_back(place);
-  };
-  for (const MeshStore::Stretch& stretch : stretches) {
-    std::string why;
-    if (!findPlaces(stretch, step, body, places, why)) {
-      sayUnknown("body '" + body.name + "'", why, step);
-      return;
-    }
-    for (std::size_t k = 1; k + 1 < places.size(); ++k) add(places[k]);
-    const std::shared_ptr<const MeshFrame>& to = stretch.to;
-    add({fractionOf(step, to->stamp_ns), to->pose,
-         body.turns ? nullptr : std::shared_ptr<const Positions>(to, &to->positions)});
-  }
-  if (offWay(body, waypoints) > options.detector.rigid_tolerance_m) body.waypoints = std::move(waypoints);
-}
-
-/// What came and was not used may have had the body anywhere.
-void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const {
-  const std::string why = stores[body].unknownWithin(from_ns, to_ns);
-  if (!why.empty()) sayUnknown("body '" + bodies[body].name + "'", why, step);
-}
-
-/// What tf says since they were placed must not be contradicted in silence.
-void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Step& step) const {
-  for (std::size_t b = 0; b <= bodies.size(); ++b) {
-    const bool is_map = b == bodies.size();
-    if (is_map ? !step.map.surface : isStream(b) || stores[b].empty()) continue;
-    const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
-    const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
-    const auto name = [&] {
-      return is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
-    };
-    const auto say = [&](const std::string& why) { sayUnknown(name(), why, step); };
-    if (frame && !frame->doubt.empty()) say(frame->doubt);
-    if (!tracks || carrier.empty()) continue;
-    const std::vector<Knot> knots =
-        is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)
-               : tracks->between({}, carrier, step.start_ns, step.stamp_ns, frame->carrier.silence);
-    if (!knots.empty() && epoch != tracks->epoch()) {
-      say(FORGOTTEN);
-      continue;
-    }
-    const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : frame->pose;
-    double off_m = 0;
-    Eigen::AlignedBox3d bounds;
-    for (const Knot& knot : knots) {
-      if (!knot.why_unknown.empty()) {
-        say(knot.why_unknown);
-        break;
-      }
-      if (knot.pose.matrix() == held.matrix()) continue;
-      if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
-      off_m = std::max(off_m, is_map ? apart(knot.pose, held, bounds)
-                                     : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
-    }
-    if (off_m <= options.detector.rigid_tolerance_m) continue;
-    std::ostringstream text;
-    text << name() << " was seen up to " << off_m << " m from where it was at its stamp; "
-         << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
-    addSentence(step.off_path, text.str());
-  }
 }
 
 Step Monitor::Impl::place(const Pending& pending) {
