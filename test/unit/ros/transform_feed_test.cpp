@@ -98,17 +98,18 @@ TEST_F(TransformFeedTest, AFrameThatWasElsewhereAtAStampBeginsAnew) {
 
 // The frame came for 1.5 s as well, and that was forgotten: from 1.25 s to 1.75 s nobody knows where it went.
 TEST_F(TransformFeedTest, WhatWasForgottenAfterAStampIsAGapUpToTheNextOne) {
-  for (const char* second : {"/arm", "/other"}) {
+  // Sent again by the one that sent it, or by another one.
+  for (const auto& [frame, second] : {std::pair("finger", "/arm"), std::pair("thumb", "/other")}) {
     feed.add(turned("camera", 1, 1, 0), false, "/camera");
-    for (const double stamp_s : {1.0, 1.25, 1.5}) feed.add(turned(second, 1, stamp_s, 3), false, "/arm");
-    EXPECT_TRUE(feed.add(turned(second, 1, 1.25, 5), false, second));
-    for (const double stamp_s : {1.75, 2.0}) feed.add(turned(second, 1, stamp_s, 3), false, "/arm");
+    for (const double stamp_s : {1.0, 1.25, 1.5}) feed.add(turned(frame, 1, stamp_s, 3), false, "/arm");
+    EXPECT_TRUE(feed.add(turned(frame, 1, 1.25, 5), false, second));
+    for (const double stamp_s : {1.75, 2.0}) feed.add(turned(frame, 1, stamp_s, 3), false, "/arm");
     std::vector<TransformFeed::NewParent> changes;
-    feed.stampsBetween("world", second, 1300000000, 1600000000, changes);
+    feed.stampsBetween("world", frame, 1300000000, 1600000000, changes);
     ASSERT_EQ(changes.size(), 1u) << second;
     EXPECT_EQ(changes[0].now, nullptr);
     changes.clear();
-    feed.stampsBetween("world", second, 1800000000, 1900000000, changes);
+    feed.stampsBetween("world", frame, 1800000000, 1900000000, changes);
     EXPECT_TRUE(changes.empty()) << "after that it is known again";
   }
 }
