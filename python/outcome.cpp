@@ -305,7 +305,8 @@ void bindValues(Class& c) {
   plain("earliest_unexpected_toc", &Outcome::earliest_unexpected_toc, "float: the same without what is expected");
   plain("total_contacts", &Outcome::total_contacts, "int: before the cut to max_contacts");
   plain("suppressed", &Outcome::suppressed, "int: initial contacts left out by choice");
-  plain("substeps", &Outcome::substeps, "int: parts that the step was cut into, for bodies that turn");
+  plain("substeps", &Outcome::substeps,
+        "int: parts that the step was cut into, for bodies that turn or have waypoints");
   plain("excluded_voxels", &Outcome::excluded_voxels, "int: finest voxels taken out by exclude_boxes");
   plain("start_ns", &Outcome::start_ns, "int: stamp of the step's start [ns], in a Stream");
   plain("stamp_ns", &Outcome::stamp_ns, "int: stamp of the step's end [ns], in a Stream");

@@ -52,7 +52,7 @@ DCCD_EXPORT bool isSeam(StepStatus status);
 enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
 /// What a scene can call for, and a user can set (doc/interface.md). Each pair and each moment counts for one effect
 /// alone. The second name of a row is that of the setting and of the published fields. Those are pairs in and out, but
-/// - rigid_bodies: bodies that turn, and how often one was placed for a part of the step;
+/// - rigid_bodies: bodies that turn or have waypoints, and how often one was placed for a part of the step;
 /// - unknown_space: zeros, for the map's thread makes an obstacle of it;
 /// - minimum_separation: pairs that carry a distance into the elementary test, and no uncertainty;
 /// - tracker_noise: pairs whose vertices bring an uncertainty radius;

@@ -19,26 +19,21 @@ static_assert(static_cast<int>(ClearanceStatus::UNKNOWN) == static_cast<int>(Dis
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 constexpr double ROUNDING = 1 + 1e-12;  // of the few operations of a speed
 
-/// No point of the body goes farther on the way from one place to another [m]. One that turns does so about its frame's
-/// origin.
-double lengthBound(const Body& body, const Waypoint& from, const Waypoint& to) {
-  double most_m = 0;
-  if (body.turns) {
-    for (const Vec3& p : *body.t0) most_m = std::max(most_m, (p - body.pose_t0.translation()).norm());
-    most_m *= Eigen::AngleAxisd(from.pose.linear().transpose() * to.pose.linear()).angle();
-    return most_m + (to.pose.translation() - from.pose.translation()).norm();
-  }
-  for (std::size_t v = 0; v < body.t0->size(); ++v)
-    most_m = std::max(most_m, ((*to.positions)[v] - (*from.positions)[v]).norm());
-  return most_m;
-}
-
-/// In the step no point of the body was faster [m/s].
+/// In the step no point of the body was faster [m/s]. One that turns does so about its frame's origin.
 double speedBound(const Body& body, double duration_s) {
-  double fastest = 0;
+  double fastest = 0, radius_m = 0;
+  for (std::size_t v = 0; body.turns && v < body.t0->size(); ++v)
+    radius_m = std::max(radius_m, ((*body.t0)[v] - body.pose_t0.translation()).norm());
   Waypoint from{0, body.pose_t0, body.t0};
   const auto goTo = [&](const Waypoint& to) {
-    fastest = std::max(fastest, lengthBound(body, from, to) / (to.u - from.u));
+    double way_m = 0;
+    if (body.turns) {
+      way_m = radius_m * Eigen::AngleAxisd(from.pose.linear().transpose() * to.pose.linear()).angle() +
+              (to.pose.translation() - from.pose.translation()).norm();
+    }
+    for (std::size_t v = 0; !body.turns && v < body.t0->size(); ++v)
+      way_m = std::max(way_m, ((*to.positions)[v] - (*from.positions)[v]).norm());
+    fastest = std::max(fastest, way_m / (to.u - from.u));
     from = to;
   };
   for (const Waypoint& point : body.waypoints) goTo(point);

@@ -45,17 +45,19 @@ Eigen::Isometry3d movedBy(double pose_scale, const Body& body, double u) {
   return interpolate(*leg.from_pose, *leg.to_pose, leg.u * pose_scale) * body.pose_t0.inverse();
 }
 
+/// The body's vertices at t0 after a motion.
+Positions moved(const Body& body, const Eigen::Isometry3d& motion) {
+  Positions places(body.t0->size());
+  for (std::size_t v = 0; v < places.size(); ++v) places[v] = motion * (*body.t0)[v];
+  return places;
+}
+
 /// Where the vertices are at the fraction u of the step.
 Positions placedAt(double pose_scale, const Body& body, double u) {
+  if (body.turns) return moved(body, movedBy(pose_scale, body, u));
   Positions placed;
-  if (!body.turns) {
-    const Leg leg = legAt(body, u);
-    interpolate(*leg.from, *leg.to, leg.u, placed);
-    return placed;
-  }
-  const Eigen::Isometry3d motion = movedBy(pose_scale, body, u);
-  placed.resize(body.t0->size());
-  for (std::size_t v = 0; v < placed.size(); ++v) placed[v] = motion * (*body.t0)[v];
+  const Leg leg = legAt(body, u);
+  interpolate(*leg.from, *leg.to, leg.u, placed);
   return placed;
 }
 
@@ -114,8 +116,8 @@ double turnBetween(const Body& body, double pose_scale, std::size_t parts) {
   double most = 0, from_u = 0;
   const auto add = [&](double u, const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
     // Of a leg as much as its share, at the most a part's.
-    const double share = std::min(1.0, 1 / (static_cast<double>(parts) * (u - from_u)));
-    most = std::max(most, share * pose_scale * rotationAngle(from, to));
+    const double part_of_it = std::min(1.0, 1 / (static_cast<double>(parts) * (u - from_u)));
+    most = std::max(most, part_of_it * pose_scale * rotationAngle(from, to));
     from_u = u;
   };
   const Eigen::Isometry3d* from = &body.pose_t0;
@@ -189,6 +191,10 @@ double leavesWayBy(const Body& body, double pose_scale, std::size_t parts) {
   }
   const double arc = body.turns ? sagitta(radius, turnBetween(body, pose_scale, parts)) : 0;
   return (offParts(body, parts) + arc + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
+}
+
+std::shared_ptr<const Positions> placesAt(const Body& body, const Waypoint& point) {
+  return body.turns ? share(moved(body, point.pose * body.pose_t0.inverse())) : point.positions;
 }
 
 WayBends::WayBends(const Body& body) : body_(body) {

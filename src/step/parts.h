@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "culling/scene_arrays.h"
@@ -30,6 +31,24 @@ class WayBends {
   const Body& body_;
   std::array<Vec3, 8> corners_;  ///< of what it spans at its start, if it turns
 };
+
+/// Where the body's vertices are at one of its waypoints.
+std::shared_ptr<const Positions> placesAt(const Body& body, const Waypoint& point);
+
+/// Calls f(from, to, share) for each of the body's ways from waypoint to waypoint: where its vertices are at both, and
+/// which share of the step lies between. Without waypoints that is the whole step.
+template <class F>
+void forEachLeg(const Body& body, F&& f) {
+  std::shared_ptr<const Positions> from = body.t0;
+  double from_u = 0;
+  for (const Waypoint& point : body.waypoints) {
+    const std::shared_ptr<const Positions> to = placesAt(body, point);
+    f(*from, *to, point.u - from_u);
+    from = to;
+    from_u = point.u;
+  }
+  f(*from, *body.t1, 1 - from_u);
+}
 
 /// How far the waypoints are from the way that the body takes without them [m].
 double offWay(const Body& body, const std::vector<Waypoint>& waypoints);

@@ -98,6 +98,7 @@ struct Monitor::Impl {
   Step place(const Pending& pending);
   static void sayUnknown(const std::string& name, const std::string& why, Step& step);
   void lookBetween(std::size_t body, Step& step) const;
+  bool isForgotten(const MeshFrame& frame) const;
   std::vector<Knot> trackOf(const MeshFrame& from, const MeshFrame& to, std::string& why) const;
   std::shared_ptr<const MeshFrame> frameAt(std::size_t body, StampNs stamp_ns, Step& step) const;
   bool findPlaces(const MeshStore::Stretch& stretch, const Step& step, const Body& body, std::vector<Waypoint>& places,

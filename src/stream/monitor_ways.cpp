@@ -100,14 +100,17 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   }
 }
 
+/// Whether tf may have forgotten what the frame was placed by. Asked last: tf may forget while it is asked.
+bool Monitor::Impl::isForgotten(const MeshFrame& frame) const { return frame.carrier.epoch != tracks->epoch(); }
+
 /// The track of what carries a body from one of its frames to the next. Empty: it stands still, or `why` says why it is
 /// not known.
 std::vector<Knot> Monitor::Impl::trackOf(const MeshFrame& from, const MeshFrame& to, std::string& why) const {
   if (!tracks || (from.carrier.frame.empty() && to.carrier.frame.empty())) return {};
   if (from.carrier.frame != to.carrier.frame) why = "the frame that carries it is another one than before";
-  if (from.carrier.epoch != tracks->epoch() || to.carrier.epoch != tracks->epoch()) why = FORGOTTEN;
   if (!why.empty()) return {};
   std::vector<Knot> knots = tracks->between({}, to.carrier.frame, from.stamp_ns, to.stamp_ns, to.carrier.silence);
+  if (isForgotten(from) || isForgotten(to)) why = FORGOTTEN;
   const auto unknown = std::find_if(knots.begin(), knots.end(), [](const Knot& k) { return !k.why_unknown.empty(); });
   if (unknown != knots.end()) why = unknown->why_unknown;
   return why.empty() ? knots : std::vector<Knot>();
@@ -124,7 +127,10 @@ std::shared_ptr<const MeshFrame> Monitor::Impl::frameAt(std::size_t b, StampNs s
     const std::vector<Knot> track = tracks->between({}, carrier, from.stamp_ns, stamp_ns, to.carrier.silence);
     if (track.empty()) continue;
     const Knot first{from.stamp_ns, from.pose}, here = track.back(), last{to.stamp_ns, to.pose};
-    if (!here.why_unknown.empty()) sayUnknown("body '" + bodies[b].name + "'", here.why_unknown, step);
+    if (!here.why_unknown.empty()) {
+      sayUnknown("body '" + bodies[b].name + "'", here.why_unknown, step);
+      return straight;
+    }
     if (standsStill({first, here, last})) continue;
     MeshFrame carried = *straight;
     carried.positions = carriedTo(here, first, last, from.positions, to.positions);
@@ -148,34 +154,40 @@ bool Monitor::Impl::findPlaces(const MeshStore::Stretch& stretch, const Step& st
     return Waypoint{fractionOf(step, knot.stamp_ns), knot.pose * first.pose.inverse() * from.pose,
                     body.turns ? nullptr : share(carriedTo(knot, first, last, from.positions, to.positions))};
   };
+  for (const Knot& knot : knots) places.push_back(placeAt(knot));
   const WayBends bends(body);
-  const double tolerance_m = options.detector.rigid_tolerance_m;
   bool is_fine = false;
   while (!is_fine && knots.size() <= tolerance::MOST_POSES_A_STEP) {
     is_fine = true;
     std::vector<Knot> finer;
+    std::vector<Waypoint> finer_places;
+    const auto add = [&](const Knot& knot, const Waypoint& place) {
+      finer.push_back(knot);
+      finer_places.push_back(place);
+    };
+    const auto addMiddle = [&](std::size_t k) {
+      const std::vector<Knot> half =
+          tracks->between({}, to.carrier.frame, knots[k].stamp_ns, knots[k + 1].stamp_ns, to.carrier.silence);
+      for (std::size_t h = 1; h + 1 < half.size(); ++h) add(half[h], placeAt(half[h]));
+    };
     for (std::size_t k = 0; k < knots.size(); ++k) {
-      Knot& knot = knots[k];
-      if (!knot.is_middle || bends.at(placeAt(knots[k - 1]), placeAt(knot), placeAt(knots[k + 1])) <= tolerance_m) {
-        finer.push_back(knot);
-        continue;
+      const bool is_off =
+          knots[k].is_middle && bends.at(places[k - 1], places[k], places[k + 1]) > options.detector.rigid_tolerance_m;
+      if (is_off) {
+        is_fine = knots[k].is_middle = false;
+        addMiddle(k - 1);
       }
-      is_fine = false;
-      knot.is_middle = false;
-      for (const std::size_t side : {k - 1, k}) {
-        const std::vector<Knot> half =
-            tracks->between({}, to.carrier.frame, knots[side].stamp_ns, knots[side + 1].stamp_ns, to.carrier.silence);
-        if (side == k) finer.push_back(knot);
-        if (half.size() > 2) finer.insert(finer.end(), half.begin() + 1, half.end() - 1);
-      }
+      add(knots[k], places[k]);
+      if (is_off) addMiddle(k);
     }
     knots = std::move(finer);
+    places = std::move(finer_places);
   }
   if (!is_fine) why = "its way bends too much between two transforms";
   for (const Knot& knot : knots) {
     if (!knot.why_unknown.empty()) why = knot.why_unknown;
-    places.push_back(placeAt(knot));
   }
+  if (isForgotten(from)) why = FORGOTTEN;
   return why.empty();
 }
 

@@ -13,6 +13,7 @@
 #include "dccd/assurance.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
+#include "step/parts.h"
 
 namespace dccd {
 namespace {
@@ -51,13 +52,18 @@ std::optional<std::size_t> faster(const Positions& from, const Positions& to, do
   return std::nullopt;
 }
 
+/// The fastest of the body's vertices from any of its waypoints to the next [m/s].
 double fastestOf(const Body& body, double seconds) {
-  double way_sq = 0;
-  for (std::size_t v = 0; v < body.t0->size(); ++v) {
-    const double one_sq = ((*body.t1)[v] - (*body.t0)[v]).squaredNorm();
-    if (std::isfinite(one_sq)) way_sq = std::max(way_sq, one_sq);
-  }
-  return seconds > 0 ? std::sqrt(way_sq) / seconds : NONE;
+  double fastest = 0;
+  forEachLeg(body, [&](const Positions& from, const Positions& to, double share) {
+    double way_sq = 0;
+    for (std::size_t v = 0; v < from.size(); ++v) {
+      const double one_sq = (to[v] - from[v]).squaredNorm();
+      if (std::isfinite(one_sq)) way_sq = std::max(way_sq, one_sq);
+    }
+    fastest = std::max(fastest, std::sqrt(way_sq) / (share * seconds));
+  });
+  return seconds > 0 ? fastest : NONE;
 }
 
 std::string nameOf(const Outcome& outcome, std::size_t body) {
@@ -293,14 +299,27 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
       const Body &before = step_->bodies[b], &now = outcome.step->bodies[b];
       if (before.name != now.name || before.t1->size() != now.t1->size()) {
         say("body '" + before.name + "' has another mesh");
-      } else if (!std::isfinite(assumed_[b].max_m_s)) {
         continue;
-      } else if (const auto v = faster(*before.t1, *now.t1, assumed_[b].max_m_s, time_ns)) {
+      }
+      if (!std::isfinite(assumed_[b].max_m_s)) continue;
+      bool was_faster = false;
+      const auto look = [&](const Positions& from, const Positions& to, StampNs ns) {
+        if (was_faster) return;
+        const std::optional<std::size_t> v = faster(from, to, assumed_[b].max_m_s, ns);
+        if (!v) return;
+        was_faster = true;
         std::ostringstream text;
         text << "body '" << now.name << "' was faster than " << assumed_[b].max_m_s << " m/s: vertex " << *v << " came "
-             << ((*now.t1)[*v] - (*before.t1)[*v]).norm() << " m in " << secondsBetween(0, time_ns) << " s";
+             << (to[*v] - from[*v]).norm() << " m in " << secondsBetween(0, ns) << " s";
         say(text.str());
-      }
+      };
+      look(*before.t1, *now.t1, time_ns);
+      if (now.waypoints.empty()) continue;
+      forEachLeg(now, [&](const Positions& from, const Positions& to, double share) {
+        look(from, to,
+             static_cast<StampNs>(
+                 std::ceil(share * static_cast<double>(outcome.step->stamp_ns - outcome.step->start_ns))));
+      });
     }
     if (step_->bodies.size() != outcome.step->bodies.size()) say("there are other bodies");
     const bool moved = obstacle_ && outcome.obstacle &&

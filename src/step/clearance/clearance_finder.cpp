@@ -72,7 +72,7 @@ void ClearanceFinder::learnBodies(const ClearancePart& part) {
     const Body& motion = part.step.bodies[b];
     state.motion = part.scene.vertices() + body.internal_begin;
     state.box = StepBox::still(body.bounds_min, body.bounds_max);
-    state.leaves_arc_m = leavesWayBy(step_->bodies[b], step_->pose_scale, part.count * stretches_);
+    state.leaves_way_m = leavesWayBy(step_->bodies[b], step_->pose_scale, part.count * stretches_);
     state.fitted = state.fitted_to_map = false;
     state.known = body.usedCount() > 0 && isUsable(state.box);
     for (std::size_t i = 0; body.masked && i < body.usedCount(); ++i) {

@@ -90,7 +90,7 @@ void ClearanceFinder::addRowsOfNear(const ClearancePart& part) {
       if (placeOf(a, b) != ROWLESS) continue;
       const BodyState &first = bodies_[a], &second = bodies_[b];
       const double limit_m = options_.max_m + first.radius_m + second.radius_m;
-      const double leaves_m = first.leaves_arc_m + second.leaves_arc_m;
+      const double leaves_m = first.leaves_way_m + second.leaves_way_m;
       const bool known = first.known && second.known;
       if (!known || !(apartByBoxes(first.box, second.box) >= limitBefore(limit_m, leaves_m))) addRow(a, b);
     }
@@ -121,7 +121,7 @@ double ClearanceFinder::radiusOf(const Row& row) const {
 /// How far the straight paths of the two may be from their arcs, together.
 double ClearanceFinder::leavesArcsBy(const Row& row) const {
   const auto [a, b] = row.answer.body;
-  return bodies_[a].leaves_arc_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].leaves_arc_m);
+  return bodies_[a].leaves_way_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].leaves_way_m);
 }
 
 /// From where on they are FARTHER on their straight paths.

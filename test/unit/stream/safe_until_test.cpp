@@ -221,6 +221,34 @@ TEST(SafeUntil, ALinkIsAssumedToBeSoManyTimesAsFastAsInTheStep) {
   EXPECT_NEAR(safeUntil(outcome, {{0}, {0.7, 3}}).seconds(), 1, 1e-6);
 }
 
+/// The tip, which dips by so much after so many tenths of the step and comes back.
+Outcome dipped(const Outcome& outcome, double by_m, int tenths) {
+  return changed(outcome, [&](Step& step) {
+    Positions down = *step.bodies[1].t0;
+    for (Vec3& p : down) p.z() -= by_m;
+    step.bodies[1].waypoints = {{tenths / 10., {}, share(down)}};
+  });
+}
+
+/// The same of a rigid body, that of its pose.
+Outcome turnedAside(const Outcome& outcome, double by_m, int tenths) {
+  return changed(outcome, [&](Step& step) {
+    Waypoint aside{tenths / 10.};
+    aside.pose.translation().z() = -by_m;
+    step.bodies[1].rigid = step.bodies[1].turns = true;
+    step.bodies[1].waypoints = {aside};
+  });
+}
+
+TEST(SafeUntil, ALinkIsAsFastAsFromWaypointToWaypoint) {
+  const Outcome at_rest = answered({between(0, 1, apart(0.6))});  // 0.1 s
+  EXPECT_EQ(safeUntil(at_rest, {{0}, {NONE, 3}}).closing_m_s, 0);
+  for (const Outcome& outcome : {dipped(at_rest, 0.02, 5), turnedAside(at_rest, 0.02, 5)})
+    EXPECT_NEAR(safeUntil(outcome, {{0}, {NONE, 3}}).seconds(), 0.6 / (3 * 0.4), 1e-6);
+  for (const Outcome& outcome : {dipped(at_rest, 0.02, 8), turnedAside(at_rest, 0.02, 8)})
+    EXPECT_NEAR(safeUntil(outcome, {{0}, {NONE, 3}}).seconds(), 0.6 / (3 * 1.0), 1e-6) << "it came back in 0.02 s";
+}
+
 // A hand in a box, away from its faces: how far the surfaces are is no distance of the two.
 TEST(SafeUntil, WhatIsInsideOfAnotherBodyTouchesIt) {
   TestStep scene;
@@ -314,6 +342,21 @@ TEST(PromiseWatch, SeesABodyThatWasFasterByOneBit) {
     EXPECT_EQ(watch.counts().kept, kept ? 1u : 0u);
     EXPECT_EQ(watch.counts().broken, kept ? 0u : 1u);
     EXPECT_EQ(watch.counts().unseen(), 1u) << "the next answer has not come";
+  }
+}
+
+TEST(PromiseWatch, SeesABodyThatWasFasterBetweenTwoFrames) {
+  for (const auto& [by_m, tenths, kept] :
+       {std::tuple{0.0249, 5, true}, {0.0251, 5, false}, {0.0099, 8, true}, {0.0101, 8, false}}) {
+    const Outcome first = answered({between(0, 1, apart(1))});
+    const Outcome back = later(first, 100 * MS, {0, 0, 0});
+    for (const Outcome& outcome : {dipped(back, by_m, tenths), turnedAside(back, by_m, tenths)}) {
+      PromiseWatch watch;
+      watch.setBounds({{0}, {0.5}});
+      watch.follow(first);
+      watch.follow(outcome);
+      EXPECT_EQ(watch.broken().empty(), kept) << by_m << " " << tenths << ": " << watch.broken();
+    }
   }
 }
 
