@@ -41,8 +41,10 @@ struct ObstacleMap {
   std::shared_ptr<const KnownSpace> known{};                         ///< what it has seen; null: it does not tell
   std::int64_t arrival_ns = 0;                                       ///< of its message, by any clock
   bool trusted = false;                                              ///< nothing of it is ever a body's own
-  std::string missed{};  ///< why nobody looked at maps that came before it, or at it; empty: each was looked at
-  OwnVoxels own{};       ///< what was taken out of it
+  /// In the order in which maps came, whatever became of them: between two without a gap none is missing. 0: it is the
+  /// one after the last.
+  std::uint64_t number = 0;
+  OwnVoxels own{};  ///< what was taken out of it
 };
 
 struct Step {

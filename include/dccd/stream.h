@@ -96,9 +96,11 @@ class DCCD_EXPORT Monitor {
   void withdraw(std::size_t body);
 
   /// The map from the next step on whose end is not before its stamp, where bodies have own voxels; else from the next
-  /// step on. Of one that is trusted nothing is a body's own. After maps that nobody looked at, which
-  /// ObstacleMap::missed says, what is own by the next one is in doubt: it may be an obstacle that those showed.
+  /// step on. Of one that is trusted nothing is a body's own. Where ObstacleMap::number
+  /// has a gap, what is own by the next one is in doubt: it may be an obstacle that those showed that are missing.
   void setMap(ObstacleMap map);
+  /// Why one that came will not be given, for the sentence about the gap that it leaves.
+  void sayOfMaps(const std::string& why);
   /// What is occupied besides, from the next map on: it is trusted, and has the frame and resolution of the others.
   void setMapBeside(ObstacleMap map);
   const ObstacleMap& map() const;       ///< as it was given last

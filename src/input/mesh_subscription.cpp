@@ -33,10 +33,11 @@ void tellLost(const std::string& topic, const std::exception& error) {
 }
 
 MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topic, const MeshType* objects_of,
-                                   Callback callback)
+                                   Came came, Callback callback)
     : node_(node),
       topic_(node_.resolveName(topic)),
       objects_of_(objects_of),
+      on_number_(std::move(came)),
       callback_(std::move(callback)),
       last_message_ns_(steadyNs()) {
   if (objects_of_) {
@@ -93,8 +94,10 @@ void MeshSubscription::heard(const std::string& type) {
 }
 
 void MeshSubscription::onBytes(const ros::MessageEvent<const ShapeShifter>& event) try {
-  const ShapeShifter::ConstPtr bytes = event.getConstMessage();
   MeshMessage message;
+  message.number = ++*came_;
+  on_number_(message.number);
+  const ShapeShifter::ConstPtr bytes = event.getConstMessage();
   message.datatype = bytes->getDataType();
   heard(message.datatype);
   message.md5 = bytes->getMD5Sum();
@@ -105,22 +108,20 @@ void MeshSubscription::onBytes(const ros::MessageEvent<const ShapeShifter>& even
   } else {
     message.no_memory = bytes->size();
   }
-  message.number = ++*came_;
   callback_(std::move(message));
 } catch (const std::exception& error) {
-  ++*came_;
   tellLost(topic_, error);
 }
 
 void MeshSubscription::onObject(const TypedMesh& object) try {
-  heard(object.type->datatype);
   MeshMessage message;
+  message.number = ++*came_;
+  on_number_(message.number);
+  heard(object.type->datatype);
   message.datatype = object.type->datatype;
   message.object = object;
-  message.number = ++*came_;
   callback_(std::move(message));
 } catch (const std::exception& error) {
-  ++*came_;
   tellLost(topic_, error);
 }
 

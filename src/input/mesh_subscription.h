@@ -32,11 +32,14 @@ namespace dccd {
 /// - when none has come yet and there are publishers that are not connected: with one type after the other.
 class MeshSubscription {
  public:
+  /// Hears the number of each message, before anything of it is taken.
+  using Came = std::function<void(std::uint64_t number)>;
   /// Gets each message with its number, its times of receipt and arrival unset.
   using Callback = std::function<void(MeshMessage)>;
 
   /// Subscribes to `topic` at once. `objects_of`: the type that is named; null: any.
-  MeshSubscription(const ros::NodeHandle& node, std::string topic, const MeshType* objects_of, Callback callback);
+  MeshSubscription(const ros::NodeHandle& node, std::string topic, const MeshType* objects_of, Came came,
+                   Callback callback);
   ~MeshSubscription();
   MeshSubscription(const MeshSubscription&) = delete;
   MeshSubscription& operator=(const MeshSubscription&) = delete;
@@ -46,6 +49,8 @@ class MeshSubscription {
   bool wantsRenewal();
   /// `published`: what the master says, datatypes by topic. Subscribes anew where that is of use.
   void renew(const std::map<std::string, std::string>& published);
+  /// Messages so far, those that were lost among them. From any thread.
+  std::uint64_t came() const { return *came_; }
   /// As of the last wantsRenewal(). From any thread.
   std::uint32_t getNumPublishers() const { return publishers_; }
 
@@ -53,6 +58,7 @@ class MeshSubscription {
   ros::NodeHandle node_;
   std::string topic_;  // resolved
   const MeshType* objects_of_;
+  Came on_number_;
   Callback callback_;
   std::atomic<std::uint32_t> publishers_{0};
   std::atomic<std::int64_t> last_message_ns_;

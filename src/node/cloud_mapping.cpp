@@ -336,7 +336,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
     view.receipt_ns = message.receipt_ns;
   }
   if (!map.surface) map.own = OwnVoxels();
-  if (!map.surface && reading.is_in) map.missed = "one was refused: " + map.problem;
+  if (reading.is_in) map.number = ++looks_;
   const double spent_s = secondsBetween(start_ns, steadyNs()) - reading.waited_s;
   const double limit_s = config_.monitor.octomap_timeout_s > 0
                              ? std::min(config_.monitor.octomap_timeout_s, config_.answer_timeout_s)

@@ -54,7 +54,7 @@ class CloudMapping {
   void setCameraInfo(std::size_t source, const std::string& problem, const std::vector<std::uint8_t>& bytes);
 
   /// The message becomes part of the map, which is returned; never throws: what is wrong is in LoadedMap::problem;
-  /// where the next map will show the cloud all the same, in LoadedMap::missed, too. There is no map while the newest
+  /// a map has the next number where the cloud is in what the next map will show. There is no map while the newest
   /// cloud of any view was refused, or of a source none has come. `may_wait` is asked again and again while there is
   /// no transform at the cloud's stamp (without one: at its receipt), or no CameraInfo; it says whether to go on, and
   /// takes its time. hasFrame() must hold. `before`: as decodeMapMessage()'s.
@@ -81,6 +81,7 @@ class CloudMapping {
   std::string frame_;
   std::optional<CloudMap> map_;
   std::map<ViewName, View> views_;
+  std::uint64_t looks_ = 0;     // clouds that are in the map, be it in part
   std::vector<float> numbers_;  // of the view that is inserted
   std::mutex mutex_;            // of pinholes_
   std::vector<std::optional<PinholeView>> pinholes_;

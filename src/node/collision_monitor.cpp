@@ -85,11 +85,16 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
+/// Of a static body the newest frame alone counts: that it is there is said before anything can go wrong with it.
+void CollisionMonitor::Impl::onMeshNumber(std::size_t body, std::uint64_t number) {
+  if (pipeline.isStatic(body)) return state.staticCame(config.bodies[body].body.name, number);
+  if (mesh_drops[body].mayLack(input_callbacks)) ++mesh_lacks[body];
+}
+
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
   frames_handed_over += message.object.handed_over;
-  if (mesh_drops[body].mayLack(input_callbacks)) ++mesh_lacks[body];
-  message.number += mesh_lacks[body];  // a number that is missing
+  message.number += mesh_lacks[body];  // numbers that are missing
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
   // voxels are followed by where the bodies were.
   if (!enabled && !pipeline.isStatic(body) && !config.ownsVoxels()) {
@@ -101,7 +106,6 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   message.arrival_ns = now_ns;
   message.since_ns = waiting_clock.now();
   queue.push(body, std::move(message));
-  if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
 void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
@@ -115,10 +119,11 @@ void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShi
 }
 
 void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {
-  map_publisher_seen = true;
   const std::int64_t now_ns = steadyNs();
-  const auto receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   state.mapCame(now_ns);
+  if (map_drops.mayLack(map_callbacks)) maps->lose();
+  map_publisher_seen = true;
+  const auto receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   const auto refuse = [&](const std::string& problem) { maps->refuse(source, problem, receipt_ns, now_ns); };
   const std::size_t size = message.bytes.size();
   const std::string problem = mapMessageProblem(message.datatype, message.md5, size, config);
@@ -127,6 +132,7 @@ void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try 
   if (needsCameraInfo(message.datatype)) listenToCameraInfo(source);
   maps->submit({source, std::move(message.datatype), std::move(message.bytes), receipt_ns}, now_ns);
 } catch (const std::exception& error) {
+  maps->lose();
   tellLost(config.liveMapNames()[source], error);
 }
 
@@ -156,6 +162,7 @@ void CollisionMonitor::Impl::subscribe() {
     const BodyConfig& body = config.bodies[b];
     mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
         input, body.topic, owns_process ? nullptr : findMeshTypeNamed(body.input.type),
+        [this, b](std::uint64_t number) { onMeshNumber(b, number); },
         [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
   const auto listenTo = [&](const std::string& topic, bool is_static) {
@@ -179,7 +186,8 @@ void CollisionMonitor::Impl::subscribe() {
     const std::size_t source = map_subscribers.size();
     ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on
     options.initByFullCallbackType<boost::shared_ptr<RawMessage>>(
-        topic, 2, [this, source](const boost::shared_ptr<RawMessage>& message) { onMap(source, *message); });
+        topic, MAP_QUEUE, [this, source](const boost::shared_ptr<RawMessage>& message) { onMap(source, *message); });
+    options.callback_queue = &map_callbacks;
     map_subscribers.push_back(input.subscribe(options));
   }
 }
@@ -205,6 +213,7 @@ void CollisionMonitor::Impl::start() {
   master->start();
   worker = std::thread([this] { work(); });
   input_spinner.start();
+  map_spinner.start();
   service_spinner.start();
 }
 
@@ -214,6 +223,7 @@ void CollisionMonitor::Impl::stop() {
   if (owns_process) endInTime();
   pipeline.monitor().cancel();
   input_spinner.stop();
+  map_spinner.stop();
   queue.wake();
   if (worker.joinable()) worker.join();
   queue.close();  // before the service thread is waited for: it may itself wait for a command

@@ -53,9 +53,12 @@ struct CollisionMonitor::Impl {
   MonitorLog log;
   std::unique_ptr<MapLoader> maps;
 
-  WatchedQueue input_callbacks;
+  static constexpr std::uint32_t MAP_QUEUE = 2;  // they are large
+
+  WatchedQueue input_callbacks, map_callbacks{MAP_QUEUE};
   ros::CallbackQueue service_callbacks;
-  ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
+  ros::AsyncSpinner input_spinner{1, &input_callbacks}, map_spinner{1, &map_callbacks};
+  ros::AsyncSpinner service_spinner{1, &service_callbacks};
   std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
   std::vector<ros::Subscriber> map_subscribers;                    // of the octomap, or one for each source of clouds
   std::map<std::size_t, ros::Subscriber> camera_info_subscribers;  // of depth pictures, by their source
@@ -71,6 +74,7 @@ struct CollisionMonitor::Impl {
   // Of what roscpp may have dropped; the input thread's.
   std::vector<DropWatch> mesh_drops;
   std::array<DropWatch, 2> tf_drops;      // of /tf, of /tf_static
+  DropWatch map_drops;                    // the maps' thread's; of clouds one that is dropped is in no map
   std::vector<std::uint64_t> mesh_lacks;  // by body, messages that are taken for missing
   bool plan_unsaid = false;               // the worker's
   StampNs newest_ns = 0;                  // stamp of the last outcome; the worker's
@@ -94,9 +98,10 @@ struct CollisionMonitor::Impl {
 
   // Input thread.
   void subscribe();
+  void onMeshNumber(std::size_t body, std::uint64_t number);
   void onMesh(std::size_t body, MeshMessage message);
   void onTransforms(const ros::MessageEvent<const topic_tools::ShapeShifter>& event, bool is_static);
-  void onMap(std::size_t source, RawMessage& message);
+  void onMap(std::size_t source, RawMessage& message);  ///< of the maps' thread, as what follows
   void listenToCameraInfo(std::size_t source);
 
   // Service thread.
@@ -113,7 +118,7 @@ struct CollisionMonitor::Impl {
   void takeMaps();
   bool waitsForMap();
   bool mayTake(std::size_t body);
-  bool holdsStaticFrames() const;
+  void tellStaticFrames();
   void tellProblems();
   void publishOutcome(Outcome& outcome);
   void predict(Outcome& outcome);

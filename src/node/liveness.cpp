@@ -39,7 +39,7 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
   if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
   lacked_map_ = false;
-  static_answered_ = static_in_use_;
+  for (auto& [body, frames] : statics_) frames.answered = frames.in_use;
 }
 
 void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
@@ -52,13 +52,14 @@ void Liveness::mapSettled(std::int64_t name, std::int64_t placed) {
   while (!maps_.empty() && maps_.front().name <= name) maps_.pop_front();
 }
 
-void Liveness::staticFrame(const std::string& body, std::int64_t now_ns) {
-  if (static_answered_ == static_came_) static_since_ns_ = now_ns, static_alone_ = false;
-  const auto [last, is_first] = static_ns_.try_emplace(body, now_ns);
-  static_alone_ = static_alone_ || is_first || secondsBetween(last->second, now_ns) > limits_.max_step_s;
-  last->second = now_ns;
-  static_newest_ = body;
-  ++static_came_;
+void Liveness::staticCame(const std::string& body, std::uint64_t number, std::int64_t now_ns) {
+  Static& frames = statics_[body];
+  if (number <= frames.came) return;
+  if (!frames.isOpen()) frames.since_ns = now_ns, frames.is_alone = false;
+  const bool follows = frames.last_ns != NEVER && secondsBetween(frames.last_ns, now_ns) <= limits_.max_step_s;
+  frames.is_alone = frames.is_alone || !follows;
+  frames.last_ns = now_ns;
+  frames.came = number;
 }
 
 void Liveness::forget() {
@@ -97,10 +98,12 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
       map_age_s_ + secondsBetween(answered_ns_, now_ns) > limits_.octomap_timeout_s) {
     add(Fault::Kind::OLD_MAP, "the map is older than " + seconds(limits_.octomap_timeout_s));
   }
-  if (static_answered_ != static_came_ &&
-      (static_alone_ || secondsBetween(static_since_ns_, now_ns) > limits_.answer_timeout_s)) {
-    add(Fault::Kind::NEWER_BODY, "a newer frame of body '" + static_newest_ + "' came, which no step has used yet");
-  }
+  const auto isLate = [&](const Static& frames) {
+    return frames.isOpen() && (frames.is_alone || secondsBetween(frames.since_ns, now_ns) > limits_.answer_timeout_s);
+  };
+  const auto late = std::find_if(statics_.begin(), statics_.end(), [&](const auto& one) { return isLate(one.second); });
+  if (late != statics_.end())
+    add(Fault::Kind::NEWER_BODY, "a newer frame of body '" + late->first + "' came, which no step has used yet");
   return faults;
 }
 

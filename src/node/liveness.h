@@ -41,12 +41,12 @@ class Liveness {
   /// have answer_timeout_s for that. An answer that was given without one of them stays no proof.
   void mapSettled(std::int64_t name, std::int64_t placed);
 
-  /// A frame of a static body came: what was said is void until a step that used it is answered. One that follows the
-  /// last one within max_step_s, as a depth camera's do all the time, has answer_timeout_s for that.
-  void staticFrame(const std::string& body, std::int64_t now_ns);
-  std::uint64_t staticFrames() const { return static_came_; }  ///< that came
-  /// So many of them are in use, or were refused, from the next step on.
-  void staticInUse(std::uint64_t frames) { static_in_use_ = frames; }
+  /// Frames of a static body came, up to this number: what was said is void until a step that used the last one is
+  /// answered. One that follows the one before within max_step_s, as a depth camera's do all the time, has
+  /// answer_timeout_s for that.
+  void staticCame(const std::string& body, std::uint64_t number, std::int64_t now_ns);
+  /// The one of this number is in use from the next step on, or was refused.
+  void staticInUse(const std::string& body, std::uint64_t number) { statics_[body].in_use = number; }
 
   /// Something is asked for that makes what was said void, until forget().
   void ask(const std::string& what) { asked_ = what; }
@@ -78,11 +78,14 @@ class Liveness {
   bool lacked_map_ = false;                              // lacksMap() held until that map got its place
   std::int64_t answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
-  std::uint64_t static_came_ = 0, static_in_use_ = 0, static_answered_ = 0;  // frames: in all, in use, in an answer
-  std::string static_newest_;                                                // the body of the last one
-  std::map<std::string, std::int64_t> static_ns_;                            // when the last one of each came
-  std::int64_t static_since_ns_ = NEVER;                                     // the first that is in no answer
-  bool static_alone_ = false;                                                // one of these follows none
+  /// Numbers of a static body's frames.
+  struct Static {
+    std::uint64_t came = 0, in_use = 0, answered = 0;
+    std::int64_t last_ns = NEVER, since_ns = NEVER;  // when the last one came, and the first that is in no answer
+    bool is_alone = false;                           // one of these follows none
+    bool isOpen() const { return answered != came; }
+  };
+  std::map<std::string, Static> statics_;
   std::string asked_;
   bool disabled_ = false, stopped_ = false;
 };

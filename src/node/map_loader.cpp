@@ -39,6 +39,7 @@ void MapLoader::put(Job job) {
   ++received_;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    job.number = ++number_;
     if (!isBusy()) busy_since_ns_ = job.arrival_ns;
     std::size_t bytes = job.message.bytes.size();
     const auto isItsPlace = [&](const Job& one) {
@@ -62,12 +63,15 @@ void MapLoader::put(Job job) {
       ++dropped_;
       job.since_ns = waiting->since_ns;
       job.message.is_behind = true;
-      // A cloud that was left out is in no map.
-      if (!config_.takesClouds()) job.missed = "they come faster than the node decodes them; send fewer";
       *waiting = std::move(job);
     }
   }
   changed_.notify_one();
+}
+
+void MapLoader::lose() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++number_;
 }
 
 void MapLoader::submit(CloudMessage message, std::int64_t arrival_ns) {
@@ -141,7 +145,7 @@ std::optional<std::int64_t> MapLoader::busySince() {
 void MapLoader::keep(LoadedMap map) {
   const bool is_small = !map.surface || map.surface->memoryBytes() <= config_.max_map_bytes / SHARE_OF_FINISHED;
   const std::size_t most = config_.ownsVoxels() && is_small ? MOST_FINISHED : 1;
-  for (; done_.size() >= most; done_.pop_back()) map.missed = "they come faster than steps take them; send fewer";
+  while (done_.size() >= most) done_.pop_back();
   done_.push_back(std::move(map));
 }
 
@@ -166,7 +170,7 @@ void MapLoader::loop() {
     LoadedMap map = load(job);
     map.arrival_ns = job.settles_ns;
     if (map.stamp_ns == 0) map.stamp_ns = job.message.receipt_ns;
-    if (!job.missed.empty()) map.missed = job.missed;
+    if (!config_.takesClouds()) map.number = job.number;
     if (!map.surface) ++refused_;
     if (map.surface || !config_.takesClouds()) last_ = map.surface;
     {

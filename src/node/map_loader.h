@@ -45,6 +45,8 @@ class MapLoader {
   /// clock; replaces one of the same view that still waits. From any thread.
   void submit(CloudMessage message, std::int64_t arrival_ns);
   void submitFile(const std::string& file, std::int64_t arrival_ns);
+  /// One came, or may have, of which there is nothing. From any thread.
+  void lose();
   /// A message of a source that is refused undecoded takes its turn all the same: it is newer than the map in use,
   /// which is void with it. From any thread.
   void refuse(std::size_t source, const std::string& problem, StampNs receipt_ns, std::int64_t arrival_ns);
@@ -73,7 +75,7 @@ class MapLoader {
     std::string file;
     std::int64_t arrival_ns = 0;
     std::string problem;          // not empty: refused
-    std::string missed{};         // why those before it were decoded by nobody; empty: each was
+    std::uint64_t number = 0;     // ObstacleMap::number; a cloud's map gets its own
     std::string view{};           // which frame_id of its source; one job of each waits
     std::int64_t since_ns = 0;    // arrival of the first of the view that nothing has come of
     std::int64_t settles_ns = 0;  // what came up to then is in the map with this one, or gave way
@@ -86,6 +88,7 @@ class MapLoader {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool frame_known_ = false;  // and set in clouds_, which is the thread's from then on
+  std::uint64_t number_ = 0;  // of the last one that came
   std::vector<Job> jobs_;     // that wait, one a view, by since_ns
   std::deque<LoadedMap> done_;
   bool stopping_ = false, decoding_ = false;

@@ -63,7 +63,7 @@ bool MonitorPipeline::settleMap(const LoadedMap& loaded, bool may_place, Obstacl
   if (refused.surface) return may_place && findPlace(loaded, map, reason);
   // What was there before is out of date, and no map is better than a wrong one.
   map = noMap(refused.problem);
-  map.missed = config_.takesClouds() ? loaded.missed : "one was refused: " + refused.problem;
+  map.number = loaded.number;
   return true;
 }
 
@@ -73,7 +73,7 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
   if (unplaced_maps_.empty()) return;
   const bool may_place = !fixed_frame_.empty() && placeTrusted(now_ns);
   ObstacleMap newest, map;
-  std::string reason, unused, missed;
+  std::string reason, unused;
   std::size_t settled = unplaced_maps_.size();
   while (settled > 0 && !settleMap(unplaced_maps_[settled - 1].map, may_place, newest, reason)) --settled;
   for (; settled > 0; --settled) {
@@ -84,10 +84,9 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     if (is_newest) {
       map = std::move(newest);
     } else if (!settleMap(loaded, may_place, map, unused)) {
-      missed = "one got no transform to its frame before the next one did";
+      monitor_->sayOfMaps("one got no transform to its frame before the next one did");
       continue;
     }
-    if (map.missed.empty()) map.missed = std::exchange(missed, {});
     const std::string frame = map.frame_id;
     const bool is_placed = map.surface != nullptr;
     if (const std::string doubt = is_placed ? tracks_.doubtAt(frame, fixed_frame_, map.stamp_ns) : ""; !doubt.empty()) {
@@ -123,7 +122,8 @@ void MonitorPipeline::limitUnplacedMaps() {
   };
   while (unplaced_maps_.size() > 1 && isTooMuch()) {
     const auto left_out = unplaced_maps_.begin() + (unplaced_maps_.size() > 2 ? 1 : 0);
-    unplaced_maps_.erase(left_out)->map.missed = "too many waited for the transforms of their frame";
+    unplaced_maps_.erase(left_out);
+    monitor_->sayOfMaps("too many waited for the transforms of their frame");
   }
 }
 

@@ -140,6 +140,9 @@ void MonitorPipeline::voidWhatWasSaid(const std::string& why) {
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   expectMap();
+  // The maps that clouds make have numbers of their own, and one that is refused has one if the cloud is in the next.
+  if (map.number == 0 && !config_.takesClouds()) map.number = map_number_ + 1;
+  map_number_ = std::max(map_number_, map.number);
   if (map.trusted && !config_.takesMapFileAlone()) {
     trusted_map_ = std::move(map);
     return;

@@ -49,6 +49,8 @@ class MonitorPipeline {
   /// Counts, decodes and keeps one message of an idle body. One that is refused is counted, too, and the clock body's
   /// yields an outcome.
   void take(std::size_t body, const MeshMessage& message);
+  /// The number of the body's last message that was taken, whatever became of it.
+  std::uint64_t lastTaken(std::size_t body) const { return came_[body]; }
   /// From the next message on. Null: meshes are taken as they come. Rigid bodies' files always are.
   void setTopologyFilter(TopologyFilter filter) { topology_filter_ = std::move(filter); }
   void setMap(LoadedMap map, std::int64_t now_ns);
@@ -190,6 +192,7 @@ class MonitorPipeline {
     LoadedMap map;
     std::int64_t since_ns = 0;
   };
+  std::uint64_t map_number_ = 0;           // of the last one that came
   std::deque<UnplacedMap> unplaced_maps_;  // oldest first
   std::optional<LoadedMap> trusted_map_;   // beside live ones
   bool trusted_placed_ = false;

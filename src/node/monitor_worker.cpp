@@ -87,12 +87,14 @@ bool CollisionMonitor::Impl::mayTake(std::size_t body) {
   return pipeline.idle(body) && queue.size(body) > 0 && !(body == config.monitor.clock_body && waitsForMap());
 }
 
-/// Whether each static body's newest frame has been taken, and is not waiting for its place.
-bool CollisionMonitor::Impl::holdsStaticFrames() const {
+/// Which frames of static bodies came, and which are in use from here on: not one that waits for its place.
+void CollisionMonitor::Impl::tellStaticFrames() {
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    if (pipeline.isStatic(b) && (queue.size(b) > 0 || !pipeline.idle(b))) return false;
+    if (!pipeline.isStatic(b) || !mesh_subscriptions[b]) continue;
+    const std::string& name = config.bodies[b].body.name;
+    state.staticCame(name, mesh_subscriptions[b]->came());  // also one that roscpp could not make
+    if (pipeline.idle(b)) state.staticInUse(name, pipeline.lastTaken(b));
   }
-  return true;
 }
 
 void CollisionMonitor::Impl::tellProblems() {
@@ -277,14 +279,13 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   pipeline.effects().hearDistances(outputs.wantsDistances());
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
-  const std::uint64_t static_frames = state.staticFrames();  // before it: what comes from here on may not be taken
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     MeshMessage message;
     if (mayTake(b) && queue.pop(b, message)) pipeline.take(b, message);
   }
   if (maps) maps->setFixedFrame(pipeline.fixedFrame());
   accountDropped();
-  if (holdsStaticFrames()) state.staticInUse(static_frames);
+  tellStaticFrames();
   Outcome outcome;
   while (!stopping && pipeline.nextOutcome(waiting_clock.now(), outcome)) {
     if (!pipeline.isResting()) publishOutcome(outcome);

@@ -82,20 +82,15 @@ void StateReporter::mapSettled(std::int64_t arrival_ns, std::int64_t placed_ns) 
   liveness_.mapSettled(arrival_ns, placed_ns);
 }
 
-void StateReporter::staticCame(const std::string& body) {
+void StateReporter::staticCame(const std::string& body, std::uint64_t number) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  liveness_.staticFrame(body, clock_.now());
+  liveness_.staticCame(body, number, clock_.now());
   say(false);
 }
 
-std::uint64_t StateReporter::staticFrames() {
+void StateReporter::staticInUse(const std::string& body, std::uint64_t number) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return liveness_.staticFrames();
-}
-
-void StateReporter::staticInUse(std::uint64_t frames) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  liveness_.staticInUse(frames);
+  liveness_.staticInUse(body, number);
 }
 
 void StateReporter::setHint(const std::string& hint) {

@@ -55,11 +55,10 @@ class StateReporter {
   /// A map came; the node uses or has refused those that came up to then.
   void mapCame(std::int64_t arrival_ns);
   void mapSettled(std::int64_t arrival_ns, std::int64_t placed_ns);
-  /// A static body's frame came.
-  void staticCame(const std::string& body);
-  std::uint64_t staticFrames();
-  /// So many of them are in use from the next step on.
-  void staticInUse(std::uint64_t frames);
+  /// Frames of a static body came, up to this number.
+  void staticCame(const std::string& body, std::uint64_t number);
+  /// The one of this number is in use from the next step on.
+  void staticInUse(const std::string& body, std::uint64_t number);
   /// A step's answer, or why there is none. `bounds`: for ~speed_scale.
   void tell(const Outcome& outcome, const Statement& statement, const std::string& frame,
             const std::vector<SpeedBound>& bounds);

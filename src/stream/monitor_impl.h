@@ -48,7 +48,7 @@ struct Monitor::Impl {
   std::deque<Pending> pending;
   ObstacleMap map, trusted;              // in force; what is occupied besides
   std::deque<ObstacleMap> maps_to_come;  // as they were given: newer than what is known of the bodies
-  std::string missed_maps;               // why nobody looked at some since the last one that is to come, or empty
+  std::uint64_t map_number = 0;          // of the last one that came
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;              // of the step that is made
   std::vector<std::string> thinned_out;  // of that step, in words

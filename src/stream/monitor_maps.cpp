@@ -49,17 +49,17 @@ std::set<std::string> Monitor::heldFrames() const {
 
 void Monitor::setMap(ObstacleMap map) {
   Impl& m = *impl_;
+  const bool is_one = map.surface || !map.problem.empty();  // else there is none, and none came
+  if (map.number == 0 && is_one) map.number = m.map_number + 1;
+  m.map_number = std::max(m.map_number, map.number);
   const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface && !map.own.doubted_surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
-    if (!m.maps_to_come.empty()) m.missed_maps = "they waited for the bodies' frames when the map was void";
-    if (!map.missed.empty()) m.missed_maps = std::move(map.missed);
+    if (!map.problem.empty()) m.own_voxels.say(map.problem);
     m.maps_to_come.clear();
     if (as_it_is) m.own_voxels.forget();
     m.map = std::move(map);
     return;
   }
-  if (map.missed.empty()) map.missed = std::move(m.missed_maps);
-  m.missed_maps.clear();
   m.maps_to_come.push_back(std::move(map));
   m.limitMapsToCome();
   if (m.tracked().empty()) {
@@ -70,6 +70,8 @@ void Monitor::setMap(ObstacleMap map) {
   }
 }
 
+void Monitor::sayOfMaps(const std::string& why) { impl_->own_voxels.say(why); }
+
 /// Of too many the oldest and the newest ones are kept.
 void Monitor::Impl::limitMapsToCome() {
   const auto isTooMuch = [&] {
@@ -79,7 +81,7 @@ void Monitor::Impl::limitMapsToCome() {
   };
   while (isTooMuch()) {
     maps_to_come.erase(maps_to_come.begin() + 1);
-    maps_to_come[1].missed = "too many came between two frames of the bodies";
+    own_voxels.say("too many came between two frames of the bodies");
   }
 }
 
@@ -130,7 +132,7 @@ void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBo
             << "'; used together they must have the same";
     map = ObstacleMap();
     map.problem = problem.str();
-    own_voxels.missMaps(map.problem);
+    own_voxels.say(map.problem);
     return;
   }
   const auto start = Deadline::Clock::now();

@@ -91,7 +91,7 @@ void describe(const std::vector<TrackedBody>& bodies, bool trust_first, const st
   if (!own.doubt.empty()) {
     own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
     own.doubt += " there in the first map";
-    if (!missed.empty()) own.doubt += " after some that were not looked at (" + missed + ")";
+    if (!missed.empty()) own.doubt += " after " + missed;
     own.doubt +=
         ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it "
         "away once, or set own_voxels_doubt: trust";
@@ -111,7 +111,6 @@ void OwnVoxelFinder::forget() {
   own_.clear();
   remembered_.clear();
   seen_.clear();
-  missed_.clear();
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
@@ -222,8 +221,16 @@ void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSp
     for (auto& one : own_) one.second.doubted = true;
   }
   const bool any_doubted = std::any_of(own_.begin(), own_.end(), [](const auto& one) { return one.second.doubted; });
-  if (!missed_.empty()) doubts_missed_ = std::exchange(missed_, {});
+  if (!missed_.empty()) doubts_missed_ = missed_;
   if (!any_doubted) doubts_missed_.clear();
+}
+
+/// Which maps came between the last one and this one, in words; empty: none. After a first one all is in doubt.
+std::string OwnVoxelFinder::missedBefore(const ObstacleMap& map) const {
+  if (!before_ || map.number <= number_ + 1) return "";
+  const std::uint64_t count = map.number - number_ - 1;
+  return std::to_string(count) + (count == 1 ? " that was" : " that were") + " not looked at (" +
+         (why_lost_.empty() ? "they come faster than they are used; send fewer" : why_lost_) + ")";
 }
 
 ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies,
@@ -232,7 +239,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (TrackedBody& body : bodies) {
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
   }
-  if (!map.missed.empty()) missMaps(map.missed);
+  missed_ = missedBefore(map);
   const bool is_other = before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id);
   if (is_other || remembered_.size() > MOST_REMEMBERED) forget();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
@@ -249,6 +256,8 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   frame_id_ = map.frame_id;
   before_ = map.surface;
   before_ns_ = map.stamp_ns;
+  number_ = map.number;
+  why_lost_.clear();
 
   ObstacleMap next = map;
   next.own = OwnVoxels();

@@ -42,8 +42,8 @@ class OwnVoxelFinder {
   ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies, double lag_s,
                      bool trust_first);
   void forget();
-  /// Maps between the last one and the next were not looked at, as ObstacleMap::missed says, too.
-  void missMaps(const std::string& why) { missed_ = why; }
+  /// Why one that came is not given, for the sentence about the gap that it leaves.
+  void say(const std::string& why) { why_lost_ = why; }
   /// Whether the body had own voxels of a map that reduce() came to the end of.
   bool forgetBody(std::uint16_t body);
   /// What reduce() made of the last map, by what is own now.
@@ -59,6 +59,7 @@ class OwnVoxelFinder {
  private:
   std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
   std::vector<ReachedCube> cubesToAsk(const ObstacleMap& map, const VoxelTree& sure, const KeyBox& region);
+  std::string missedBefore(const ObstacleMap& map) const;
   /// unknown_yet: bodies of which nothing is known as old as the map.
   void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
               const std::set<int>& unknown_yet);
@@ -74,8 +75,10 @@ class OwnVoxelFinder {
   RigidShapes shapes_;                               // of bodies that have been asked about
   std::vector<OccupiedLeaf> seen_;                   // by (7), of the last map
   std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
-  std::string missed_;                               // why maps were not looked at since the last one; empty: all were
-  std::string doubts_missed_;                        // the same, where some doubt is for that reason
+  std::uint64_t number_ = 0;                         // ObstacleMap::number of the last map
+  std::string why_lost_;                             // why one was lost since it, as far as somebody said so
+  std::string missed_;         // which came before the map that is looked at, after the last one; empty: none
+  std::string doubts_missed_;  // the same, where some doubt is for that reason
 };
 
 }  // namespace dccd

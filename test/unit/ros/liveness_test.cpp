@@ -130,32 +130,58 @@ TEST(Liveness, AStaticBodysNewerFrameVoidsWhatWasSaid) {
   liveness.frame(1, 0);
   liveness.outcome(1, -1, 10 * MS);
   EXPECT_EQ(kinds(liveness, 20 * MS), Kinds{});
-  liveness.staticFrame("table", 20 * MS);
+  liveness.staticCame("table", 1, 20 * MS);
   EXPECT_EQ(kinds(liveness, 20 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "at once";
   EXPECT_EQ(liveness.faults(20 * MS)[0].sentence, "a newer frame of body 'table' came, which no step has used yet");
   liveness.frame(2, 30 * MS);
   liveness.outcome(2, -1, 40 * MS);
   EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "that step was made without it";
-  liveness.staticInUse(liveness.staticFrames());
+  liveness.staticInUse("table", 1);
   EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "no step has used it";
-  liveness.staticFrame("table", 45 * MS);
+  liveness.staticCame("table", 2, 45 * MS);
   liveness.outcome(3, -1, 50 * MS);
   EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "the second came meanwhile";
-  liveness.staticInUse(liveness.staticFrames());
+  liveness.staticInUse("table", 2);
+  liveness.staticCame("table", 2, 55 * MS);
   liveness.outcome(4, -1, 60 * MS);
-  EXPECT_EQ(kinds(liveness, 60 * MS), Kinds{});
+  EXPECT_EQ(kinds(liveness, 60 * MS), Kinds{}) << "it came once";
+}
+
+// What is lost between its number and its place is never in use: the next one takes its place.
+TEST(Liveness, AStaticBodysFrameThatIsLostProvesNothing) {
+  Liveness liveness({0.1, 10, 0});
+  liveness.staticInUse("table", 1);
+  liveness.staticCame("table", 1, 0);
+  liveness.staticCame("chair", 1, 0);
+  liveness.staticInUse("chair", 1);
+  liveness.frame(1, 0);
+  liveness.outcome(1, -1, 10 * MS);
+  EXPECT_EQ(kinds(liveness, 10 * MS), Kinds{});
+  liveness.staticCame("table", 2, 20 * MS);
+  for (int k = 2; k < 6; ++k) {
+    liveness.staticInUse("table", 1);
+    liveness.staticCame("chair", 2, 30 * MS);
+    liveness.staticInUse("chair", 2);
+    liveness.frame(k, 10 * (k + 2) * MS);
+    liveness.outcome(k, -1, 10 * (k + 2) * MS);
+    EXPECT_EQ(kinds(liveness, 10 * (k + 2) * MS), Kinds{Fault::Kind::NEWER_BODY}) << "what others send is not it";
+  }
+  liveness.staticCame("table", 3, 80 * MS);
+  liveness.staticInUse("table", 3);
+  liveness.outcome(6, -1, 90 * MS);
+  EXPECT_EQ(kinds(liveness, 90 * MS), Kinds{});
 }
 
 // A depth camera's surfaces come as often as the cloth's frames; each is in the next answer.
 TEST(Liveness, AStreamOfStaticFramesHasItsTime) {
   Liveness liveness({0.1, 0.5, 0});
-  liveness.staticFrame("surface", 0);
+  liveness.staticCame("surface", 1, 0);
   for (int k = 1; k <= 20; ++k) {
-    liveness.staticInUse(liveness.staticFrames());
+    liveness.staticInUse("surface", static_cast<std::uint64_t>(k));
     liveness.frame(k, 30 * k * MS);
     liveness.outcome(k, -1, (30 * k + 5) * MS);
     EXPECT_EQ(kinds(liveness, (30 * k + 5) * MS), Kinds{});
-    liveness.staticFrame("surface", (30 * k + 10) * MS);
+    liveness.staticCame("surface", static_cast<std::uint64_t>(k + 1), (30 * k + 10) * MS);
     EXPECT_EQ(kinds(liveness, (30 * k + 29) * MS), Kinds{}) << k;
   }
   EXPECT_EQ(kinds(liveness, 720 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "0.1 s after the last one came";

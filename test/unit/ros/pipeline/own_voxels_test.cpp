@@ -94,14 +94,14 @@ TEST_F(OwnVoxelsOfANode, WhyMapsWereNotLookedAtIsSaid) {
     return describe(assuranceOf(driven.outcome));
   };
   LoadedMap late = decodeMapMessage(mapOf(tableAnd(true), 1.1), driven.config);
-  late.missed = "they come faster than the node decodes them; send fewer";
-  EXPECT_NE(saidAfter(1.2, late).find("4 voxels near body 'mesh' that were there in the first map after some that were "
-                                      "not looked at (they come faster than the node decodes them; send fewer)"),
+  late.number = 4;
+  EXPECT_NE(saidAfter(1.2, late).find("4 voxels near body 'mesh' that were there in the first map after 2 that were "
+                                      "not looked at (they come faster than they are used; send fewer)"),
             std::string::npos);
   LoadedMap refused, whole = decodeMapMessage(mapOf(tableAnd(true), 1.3), driven.config);
   refused.problem = "a test";
   driven.pipeline.setMap(refused, 0);
-  EXPECT_NE(saidAfter(1.4, whole).find("not looked at (one was refused: a test)"), std::string::npos);
+  EXPECT_NE(saidAfter(1.4, whole).find("1 that was not looked at (a test)"), std::string::npos);
   LoadedMap lost = whole;
   lost.frame_id = "nowhere";
   driven.pipeline.setMap(lost, 0);
@@ -134,14 +134,17 @@ TEST_F(OwnVoxelsOfANode, TheLoaderKeepsFinishedMapsAndSaysWhichCameAfterOthers) 
       submit(i);
       finished(i - 1);
     }
-    std::vector<std::pair<StampNs, bool>> taken;
-    for (LoadedMap one; loader.take(one);) taken.emplace_back(one.stamp_ns / 1000000000, !one.missed.empty());
+    loader.lose();
+    submit(8);
+    finished(7);
+    std::vector<std::pair<StampNs, std::uint64_t>> taken;
+    for (LoadedMap one; loader.take(one);) taken.emplace_back(one.stamp_ns / 1000000000, one.number);
     if (owns) {
-      const std::vector<std::pair<StampNs, bool>> first_and_last{{1, false}, {3, true}, {4, false}, {7, true}};
-      EXPECT_EQ(taken, first_and_last);
+      const std::vector<std::pair<StampNs, std::uint64_t>> first_and_last{{1, 1}, {3, 3}, {4, 4}, {8, 9}};
+      EXPECT_EQ(taken, first_and_last) << "numbers that are missing tell of the others";
     } else {
       ASSERT_EQ(taken.size(), 1u);
-      EXPECT_EQ(taken[0].first, 7);
+      EXPECT_EQ(taken[0].first, 8);
     }
   }
 }
