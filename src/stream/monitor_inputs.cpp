@@ -79,10 +79,12 @@ Step Monitor::Impl::place(const Pending& pending) {
   takeMaps(step.stamp_ns);
   step.map = usableMap(step.stamp_ns);
   thinned_out.clear();
+  std::vector<bool> shown(bodies.size());  // where it was in the whole step, or said that nobody knows
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
     if (!isStream(b)) {
       placeBetween(stores[b].newestShared(), stores[b].newestShared(), body);
+      shown[b] = lookAtHeld(b, pending.from->carrier.epoch, step);
       continue;
     }
     lookForUnused(b, step.start_ns, step.stamp_ns, step);
@@ -92,17 +94,22 @@ Step Monitor::Impl::place(const Pending& pending) {
     }
     if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
       placeBetween(pending.from, pending.to, body);
-      follow(b, {{pending.from, pending.to, 0, 1}}, step);
+      shown[b] = follow(b, {{pending.from, pending.to, 0, 1}}, step);
     } else {
       placeBetween(frameAt(b, step.start_ns, step), frameAt(b, step.stamp_ns, step), body);
       lookBetween(b, step);
       auto stretches = stores[b].pathWithin(step.start_ns + 1, step.stamp_ns - 1);
       std::reverse(stretches.begin(), stretches.end());
-      follow(b, stretches, step);
+      shown[b] = follow(b, stretches, step);
     }
     stores[b].forgetBefore(wayNeededFrom(b, step.stamp_ns));
   }
-  lookAtHeld(pending.from->carrier.epoch, step);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!shown[b]) sayUnknown("body '" + bodies[b].name + "'", "nobody looked", step);
+  }
+  if (step.map.surface && !lookAtHeld(bodies.size(), pending.from->carrier.epoch, step)) {
+    sayUnknown("the octomap's frame", "nobody looked", step);
+  }
   keepReferences(step, references);
   return step;
 }

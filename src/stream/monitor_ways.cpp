@@ -193,17 +193,20 @@ bool Monitor::Impl::findPlaces(const MeshStore::Stretch& stretch, const Step& st
 
 /// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it; a
 /// rigid body is carried as it is. Where that leaves the way from the step's start to its end, it becomes waypoints.
-void Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>& stretches, Step& step) const {
+bool Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>& stretches, Step& step) const {
   Body& body = step.bodies[b];
   std::vector<Waypoint> waypoints, places;
   const auto add = [&](const Waypoint& place) {
     if (place.u > 0 && place.u < 1 && (waypoints.empty() || place.u > waypoints.back().u)) waypoints.push_back(place);
   };
+  StampNs known_ns = step.start_ns;
   for (const MeshStore::Stretch& stretch : stretches) {
+    if (stretch.from->stamp_ns > known_ns) return false;
+    known_ns = stretch.to->stamp_ns;
     std::string why;
     if (!findPlaces(stretch, step, body, places, why)) {
       sayUnknown("body '" + body.name + "'", why, step);
-      return;
+      return true;
     }
     for (std::size_t k = 1; k + 1 < places.size(); ++k) add(places[k]);
     const std::shared_ptr<const MeshFrame>& to = stretch.to;
@@ -211,6 +214,7 @@ void Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>&
          body.turns ? nullptr : std::shared_ptr<const Positions>(to, &to->positions)});
   }
   if (offWay(body, waypoints) > options.detector.rigid_tolerance_m) body.waypoints = std::move(waypoints);
+  return known_ns >= step.stamp_ns;
 }
 
 /// What came and was not used may have had the body anywhere.
@@ -219,45 +223,43 @@ void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_
   if (!why.empty()) sayUnknown("body '" + bodies[body].name + "'", why, step);
 }
 
-/// What tf says since they were placed must not be contradicted in silence.
-void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Step& step) const {
-  for (std::size_t b = 0; b <= bodies.size(); ++b) {
-    const bool is_map = b == bodies.size();
-    if (is_map ? !step.map.surface : isStream(b) || stores[b].empty()) continue;
-    const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
-    const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
-    const auto name = [&] {
-      return is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
-    };
-    const auto say = [&](const std::string& why) { sayUnknown(name(), why, step); };
-    if (frame && !frame->doubt.empty()) say(frame->doubt);
-    if (!tracks || carrier.empty()) continue;
-    const std::vector<Knot> knots =
-        is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)
-               : tracks->between({}, carrier, step.start_ns, step.stamp_ns, frame->carrier.silence);
-    if (!knots.empty() && epoch != tracks->epoch()) {
-      say(FORGOTTEN);
-      continue;
+/// What tf says since it was placed must not be contradicted in silence.
+bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) const {
+  const bool is_map = b == bodies.size();
+  const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
+  const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
+  const std::string name =
+      is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
+  const auto say = [&](const std::string& why) { sayUnknown(name, why, step); };
+  if (frame && !frame->doubt.empty()) say(frame->doubt);
+  if (!tracks || carrier.empty()) return true;
+  const std::vector<Knot> knots =
+      is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)
+             : tracks->between({}, carrier, step.start_ns, step.stamp_ns, frame->carrier.silence);
+  if (!knots.empty() && epoch != tracks->epoch()) {
+    say(FORGOTTEN);
+    return true;
+  }
+  const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : frame->pose;
+  double off_m = 0;
+  Eigen::AlignedBox3d bounds;
+  for (const Knot& knot : knots) {
+    if (!knot.why_unknown.empty()) {
+      say(knot.why_unknown);
+      break;
     }
-    const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : frame->pose;
-    double off_m = 0;
-    Eigen::AlignedBox3d bounds;
-    for (const Knot& knot : knots) {
-      if (!knot.why_unknown.empty()) {
-        say(knot.why_unknown);
-        break;
-      }
-      if (knot.pose.matrix() == held.matrix()) continue;
-      if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
-      off_m = std::max(off_m, is_map ? apart(knot.pose, held, bounds)
-                                     : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
-    }
-    if (off_m <= options.detector.rigid_tolerance_m) continue;
+    if (knot.pose.matrix() == held.matrix()) continue;
+    if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
+    off_m = std::max(off_m, is_map ? apart(knot.pose, held, bounds)
+                                   : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
+  }
+  if (off_m > options.detector.rigid_tolerance_m) {
     std::ostringstream text;
-    text << name() << " was seen up to " << off_m << " m from where it was at its stamp; "
+    text << name << " was seen up to " << off_m << " m from where it was at its stamp; "
          << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
     addSentence(step.off_path, text.str());
   }
+  return true;
 }
 
 }  // namespace dccd
