@@ -1,12 +1,21 @@
-# test/fuzz/NAME_fuzz.cpp (the core) and test/fuzz/decoders/NAME_fuzz.cpp (messages and files): in the ordinary build all of
-# them are one gtest binary, fuzz_tests, that replays test/fuzz/corpus/NAME; with DEFORMABLE_CCD_FUZZ (Clang, a core-only
-# tree) each is a libFuzzer executable NAME_fuzz:
+# test/fuzz/NAME_fuzz.cpp (the core) and test/fuzz/decoders/NAME_fuzz.cpp (messages and files): in the ordinary build they
+# are two gtest binaries, fuzz_tests and decoder_fuzz_tests, that replay test/fuzz/corpus/NAME; with DEFORMABLE_CCD_FUZZ
+# (Clang, a core-only tree) each is a libFuzzer executable NAME_fuzz:
 #   NAME_fuzz -max_total_time=600 WORK_FOLDER test/fuzz/corpus/NAME
 file(GLOB FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/*_fuzz.cpp)
 file(GLOB DECODER_FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/decoders/*_fuzz.cpp)
 
-# What the decoders call of the node. In the ordinary build fuzz_tests links these files and no others of it, so that the
-# list is whole. Objects, not an archive: a message type registers itself, and nothing else asks for its file.
+if(NOT DEFORMABLE_CCD_FUZZ)
+  add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} LIBRARIES deformable_ccd_archive)
+  if(NOT DEFORMABLE_CCD_CORE_ONLY)
+    add_gtest_suite(decoder_fuzz_tests SOURCES ${DECODER_FUZZ_SOURCES}
+      LIBRARIES deformable_ccd_physics deformable_ccd_ros ${ROS_LINK_LIBRARIES})
+  endif()
+  return()
+endif()
+
+# What the decoders call of the node. Objects, not an archive: a message type registers itself, and nothing else asks for
+# its file.
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 set(DECODER_SOURCES ${MESSAGE_TYPES}
   scenes/physics/scene_file.cpp scenes/physics/shapes.cpp
@@ -16,24 +25,6 @@ set(DECODER_SOURCES ${MESSAGE_TYPES}
   src/input/obj_file.cpp src/input/ply_file.cpp src/input/ply_header.cpp src/input/polygons.cpp
   src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp src/node/map_decode.cpp
   src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
-
-if(NOT DEFORMABLE_CCD_FUZZ)
-  if(DEFORMABLE_CCD_CORE_ONLY)
-    add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} LIBRARIES deformable_ccd_archive)
-    return()
-  endif()
-  add_library(deformable_ccd_decoders OBJECT EXCLUDE_FROM_ALL ${DECODER_SOURCES})
-  add_dependencies(deformable_ccd_decoders ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
-  target_include_directories(deformable_ccd_decoders PUBLIC src ${CMAKE_CURRENT_SOURCE_DIR})
-  target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-  target_compile_options(deformable_ccd_decoders PRIVATE ${COLD_CODE})
-  set_target_properties(deformable_ccd_decoders PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
-  target_link_libraries(deformable_ccd_decoders PUBLIC
-    deformable_ccd_headers yaml-cpp ${TINYXML2_LIBRARY} ${catkin_LIBRARIES} ${PCL_COMMON_LIBRARIES})
-  add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES}
-    LIBRARIES deformable_ccd_decoders deformable_ccd_archive)
-  return()
-endif()
 
 # Clang 14 compiles these two kernels for many minutes, the more with every check that stands beside a load. They keep
 # AddressSanitizer here; `scripts/test --sanitize address,undefined` has GCC look at them in full.

@@ -41,6 +41,9 @@ struct Monitor::Impl {
     std::vector<std::shared_ptr<const Topology>> topologies;
   };
 
+  /// By body, and last of the map: somebody looked where it was in all of a step, and said so where it is not known.
+  using Shown = std::vector<bool>;
+
   MonitorOptions options;
   std::vector<Body> bodies;  // as they were given, without mesh and motion
   std::vector<MeshStore> stores;
@@ -108,9 +111,10 @@ struct Monitor::Impl {
   bool follow(std::size_t body, const std::vector<MeshStore::Stretch>& stretches, Step& step) const;
   /// Says of the step what came of the body between the stamps and was not used.
   void lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const;
-  /// The same of what is held where it was placed once: a static body or, by the number of bodies, the map. epoch: of
-  /// the step's first frame.
-  bool lookAtHeld(std::size_t body, std::uint64_t epoch, Step& step) const;
+  /// The same of what is held where it was placed once: static bodies and the map. epoch: of the step's first frame.
+  void lookAtHeld(std::uint64_t epoch, Shown& shown, Step& step) const;
+  void lookAtHeld(std::size_t body, std::uint64_t epoch, Step& step) const;
+  void sayUnshown(const Shown& shown, Step& step) const;
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();
   /// Nothing is carried over a seam.

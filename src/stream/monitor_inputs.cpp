@@ -79,12 +79,11 @@ Step Monitor::Impl::place(const Pending& pending) {
   takeMaps(step.stamp_ns);
   step.map = usableMap(step.stamp_ns);
   thinned_out.clear();
-  std::vector<bool> shown(bodies.size());  // where it was in the whole step, or said that nobody knows
+  Shown shown(bodies.size() + 1);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
     if (!isStream(b)) {
       placeBetween(stores[b].newestShared(), stores[b].newestShared(), body);
-      shown[b] = lookAtHeld(b, pending.from->carrier.epoch, step);
       continue;
     }
     lookForUnused(b, step.start_ns, step.stamp_ns, step);
@@ -104,12 +103,8 @@ Step Monitor::Impl::place(const Pending& pending) {
     }
     stores[b].forgetBefore(wayNeededFrom(b, step.stamp_ns));
   }
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (!shown[b]) sayUnknown("body '" + bodies[b].name + "'", "nobody looked", step);
-  }
-  if (step.map.surface && !lookAtHeld(bodies.size(), pending.from->carrier.epoch, step)) {
-    sayUnknown("the octomap's frame", "nobody looked", step);
-  }
+  lookAtHeld(pending.from->carrier.epoch, shown, step);
+  sayUnshown(shown, step);
   keepReferences(step, references);
   return step;
 }

@@ -35,7 +35,8 @@ Outcome Monitor::checkNow() {
   m.keepReferences(step, references);
   step.start_ns = step.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   step.map = m.usableMap(step.stamp_ns);
-  m.lookAtHeld(m.stores[m.options.clock_body].newest().carrier.epoch, step);
+  Impl::Shown shown(m.bodies.size() + 1);
+  m.lookAtHeld(m.stores[m.options.clock_body].newest().carrier.epoch, shown, step);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     if (!m.isStream(b)) continue;
     const MeshFrame& newest = m.stores[b].newest();
@@ -43,7 +44,9 @@ Outcome Monitor::checkNow() {
     m.trackOf(newest, newest, why);
     if (!why.empty()) m.sayUnknown("body '" + m.bodies[b].name + "'", why, step);
     m.lookForUnused(b, newest.stamp_ns, std::numeric_limits<StampNs>::max(), step);  // what came after it
+    shown[b] = true;
   }
+  m.sayUnshown(shown, step);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
   Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, Deadline().orWhen(m.cancelled));

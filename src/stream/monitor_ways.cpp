@@ -112,7 +112,7 @@ std::vector<Knot> Monitor::Impl::trackOf(const MeshFrame& from, const MeshFrame&
   std::vector<Knot> knots = tracks->between({}, to.carrier.frame, from.stamp_ns, to.stamp_ns, to.carrier.silence);
   if (isForgotten(from) || isForgotten(to)) why = FORGOTTEN;
   const auto unknown = std::find_if(knots.begin(), knots.end(), [](const Knot& k) { return !k.why_unknown.empty(); });
-  if (unknown != knots.end()) why = unknown->why_unknown;
+  if (unknown != knots.end() && why.empty()) why = unknown->why_unknown;
   return why.empty() ? knots : std::vector<Knot>();
 }
 
@@ -223,22 +223,38 @@ void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_
   if (!why.empty()) sayUnknown("body '" + bodies[body].name + "'", why, step);
 }
 
-/// What tf says since it was placed must not be contradicted in silence.
-bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) const {
+void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Shown& shown, Step& step) const {
+  for (std::size_t b = 0; b <= bodies.size(); ++b) {
+    const bool is_map = b == bodies.size();
+    if (is_map ? step.map.surface != nullptr : !isStream(b)) lookAtHeld(b, epoch, step);
+    shown[b] = shown[b] || is_map || !isStream(b);
+  }
+}
+
+void Monitor::Impl::sayUnshown(const Shown& shown, Step& step) const {
+  for (std::size_t b = 0; b < shown.size(); ++b) {
+    if (shown[b]) continue;
+    sayUnknown(b < bodies.size() ? "body '" + bodies[b].name + "'" : "the octomap's frame", "nobody looked", step);
+  }
+}
+
+/// What tf says since it was placed must not be contradicted in silence. body: their number stands for the map.
+void Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) const {
   const bool is_map = b == bodies.size();
   const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
   const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
-  const std::string name =
-      is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
-  const auto say = [&](const std::string& why) { sayUnknown(name, why, step); };
+  const auto name = [&] {  // most of the time nobody asks
+    return is_map ? "the octomap's frame '" + carrier + "'" : "the frame of the static body '" + bodies[b].name + "'";
+  };
+  const auto say = [&](const std::string& why) { sayUnknown(name(), why, step); };
   if (frame && !frame->doubt.empty()) say(frame->doubt);
-  if (!tracks || carrier.empty()) return true;
+  if (!tracks || carrier.empty()) return;
   const std::vector<Knot> knots =
       is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)
              : tracks->between({}, carrier, step.start_ns, step.stamp_ns, frame->carrier.silence);
   if (!knots.empty() && epoch != tracks->epoch()) {
     say(FORGOTTEN);
-    return true;
+    return;
   }
   const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : frame->pose;
   double off_m = 0;
@@ -253,13 +269,11 @@ bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
     off_m = std::max(off_m, is_map ? apart(knot.pose, held, bounds)
                                    : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
   }
-  if (off_m > options.detector.rigid_tolerance_m) {
-    std::ostringstream text;
-    text << name << " was seen up to " << off_m << " m from where it was at its stamp; "
-         << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
-    addSentence(step.off_path, text.str());
-  }
-  return true;
+  if (off_m <= options.detector.rigid_tolerance_m) return;
+  std::ostringstream text;
+  text << name() << " was seen up to " << off_m << " m from where it was at its stamp; "
+       << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
+  addSentence(step.off_path, text.str());
 }
 
 }  // namespace dccd

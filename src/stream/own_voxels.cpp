@@ -257,7 +257,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   before_ = map.surface;
   before_ns_ = map.stamp_ns;
   number_ = map.number;
-  why_lost_.clear();
+  if (!missed_.empty()) why_lost_.clear();
 
   ObstacleMap next = map;
   next.own = OwnVoxels();

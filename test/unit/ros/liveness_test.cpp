@@ -149,7 +149,7 @@ TEST(Liveness, AStaticBodysNewerFrameVoidsWhatWasSaid) {
 
 // What is lost between its number and its place is never in use: the next one takes its place.
 TEST(Liveness, AStaticBodysFrameThatIsLostProvesNothing) {
-  Liveness liveness({0.1, 10, 0});
+  Liveness liveness({0.01, 10, 0});
   liveness.staticInUse("table", 1);
   liveness.staticCame("table", 1, 0);
   liveness.staticCame("chair", 1, 0);
