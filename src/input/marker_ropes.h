@@ -17,6 +17,11 @@ inline bool isLineMarker(const MarkerView& marker) {
 inline bool isPointMarker(const MarkerView& marker) {
   return marker.type == MARKER_POINTS || marker.type == MARKER_SPHERE_LIST;
 }
+/// Of a type whose geometry its points are.
+inline bool isListOfPoints(const MarkerView& marker) {
+  return isLineMarker(marker) || isPointMarker(marker) || marker.type == MARKER_CUBE_LIST ||
+         marker.type == MARKER_TRIANGLE_LIST;
+}
 /// Without its scale: of lines and points that is how thick they are drawn. Throws WireError for a pose that is not
 /// finite.
 Eigen::Affine3d poseOf(const MarkerView& marker);

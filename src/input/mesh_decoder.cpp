@@ -1,6 +1,8 @@
 #include "input/mesh_decoder.h"
 
 #include <algorithm>
+#include <array>
+#include <set>
 #include <sstream>
 
 #include "input/marker_ropes.h"
@@ -364,7 +366,6 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
               std::to_string(marker.type) + (marker.points.size == 0 ? " without points)" : ")");
     }
   }
-  // What is drawn of a mesh besides its faces, or of a rope besides its lines, is nothing of its own.
   const std::vector<const MarkerView*>& taken = !lists.empty() ? lists : !lines.empty() ? lines : points;
   const bool passed_over = passesOver(markers);
   if (taken.empty() || passed_over) {
@@ -383,10 +384,40 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
   names_.require(taken);
   DecodedMesh mesh = &taken == &lists ? decodeSoup(*lists[0]) : decodeRopes(taken);
   names_.keep(taken);
-  if (&taken != &lists) return mesh;
-  mesh.unread_lists = lists.size() - 1;
-  for (std::size_t i = 1; i < lists.size(); ++i) mesh.dropped_faces += (lists[i]->points.size + 2) / 3;
+  if (&taken == &lists) lists.resize(1);
+  tellUnread(markers, taken, mesh);
   return mesh;
+}
+
+/// Lines and points that lie just where the mesh has vertices are drawn of it, and arrows and texts are no things. All
+/// else may be one that the mesh is not, and nobody looks at it.
+void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::vector<const MarkerView*>& taken,
+                             DecodedMesh& mesh) const {
+  std::set<std::array<double, 3>> places;
+  const auto isVertex = [&](const Vec3& p) { return !p.allFinite() || places.count({p.x(), p.y(), p.z()}) > 0; };
+  const auto isDrawnOfIt = [&](const MarkerView& marker) {
+    if (!isLineMarker(marker) && !isPointMarker(marker)) return false;
+    if (marker.header.frame_id != taken.front()->header.frame_id) return false;
+    if (places.empty()) {
+      for (const Vec3& p : mesh.positions) places.insert({p.x(), p.y(), p.z()});
+    }
+    const Eigen::Affine3d pose = poseOf(marker);
+    for (std::size_t i = 0; i < marker.points.size; ++i) {
+      const auto p = marker.points[i];
+      if (!isVertex(pose * Vec3(p[0], p[1], p[2]))) return false;
+    }
+    return true;
+  };
+  for (const MarkerView& marker : markers) {
+    const bool is_thing = marker.type != MARKER_ARROW && marker.type != MARKER_TEXT &&
+                          (!isListOfPoints(marker) || marker.points.size > 0);
+    const bool by_choice = config_.source == TopologySource::POLYLINE && marker.type == MARKER_TRIANGLE_LIST;
+    const bool is_taken = std::find(taken.begin(), taken.end(), &marker) != taken.end();
+    if (!isWanted(marker) || !is_thing || by_choice || is_taken || isDrawnOfIt(marker)) continue;
+    if (mesh.unread_markers++ == 0) mesh.unread_marker = nameOf(marker) + ", type " + std::to_string(marker.type);
+    mesh.dropped_faces += marker.type == MARKER_TRIANGLE_LIST ? (marker.points.size + 2) / 3
+                                                              : std::max<std::size_t>(marker.points.size, 1);
+  }
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {

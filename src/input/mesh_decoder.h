@@ -58,7 +58,8 @@ struct PassedOver : MeshError {
 struct DecodedMesh : MeshFrame {
   std::string frame_id;
   std::size_t weld_changes = 0;    ///< welded vertices whose corners came apart
-  std::size_t unread_lists = 0;    ///< triangle lists beside the one that was taken
+  std::size_t unread_markers = 0;  ///< beside those that were taken, and not drawn of these: unchecked
+  std::string unread_marker;       ///< the first of them: its name and type
   std::size_t no_measurement = 0;  ///< pixels of a depth image that are none
   std::string camera_hint;    ///< that it looks like a depth camera's picture, taken for a grid; empty: it does not
   std::string row_step_hint;  ///< what a cloud says that its data contradict; empty: nothing
@@ -109,6 +110,9 @@ class MeshDecoder {
   /// Whether the marker is of a type that becomes a mesh here, and has the wanted name.
   bool isWanted(const MarkerView& marker) const;
   bool isReadable(const MarkerView& marker) const;
+  /// Names and counts the markers that may be things of their own.
+  void tellUnread(const std::vector<MarkerView>& markers, const std::vector<const MarkerView*>& taken,
+                  DecodedMesh& mesh) const;
   /// Nothing of the message is the mesh, and the mesh is elsewhere: by the names of its markers.
   bool passesOver(const std::vector<MarkerView>& markers) const;
   void checkFaces(std::size_t count) const;

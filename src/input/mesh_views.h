@@ -95,8 +95,8 @@ struct MarkerView {
   std::array<double, 3> scale{};
   WireSpan<PointOnWire> points;
 };
-constexpr std::int32_t MARKER_LINE_STRIP = 4, MARKER_LINE_LIST = 5, MARKER_SPHERE_LIST = 7, MARKER_POINTS = 8,
-                       MARKER_TRIANGLE_LIST = 11;
+constexpr std::int32_t MARKER_ARROW = 0, MARKER_LINE_STRIP = 4, MARKER_LINE_LIST = 5, MARKER_CUBE_LIST = 6,
+                       MARKER_SPHERE_LIST = 7, MARKER_POINTS = 8, MARKER_TEXT = 9, MARKER_TRIANGLE_LIST = 11;
 constexpr std::int32_t MARKER_ADD = 0;
 
 using MeshView = std::variant<CloudView, IndexedView, std::vector<MarkerView>>;

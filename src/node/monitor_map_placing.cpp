@@ -63,7 +63,6 @@ bool MonitorPipeline::settleMap(const LoadedMap& loaded, bool may_place, Obstacl
   if (refused.surface) return may_place && findPlace(loaded, map, reason);
   // What was there before is out of date, and no map is better than a wrong one.
   map = noMap(refused.problem);
-  map.number = loaded.number;
   return true;
 }
 

@@ -155,10 +155,11 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   add(sizeHint("the mesh", mesh.positions, "scale them in the publisher"));
   add(swappedHint(mesh, config));
   add(shuffledHint(mesh));
-  if (mesh.unread_lists > 0) {
-    add(std::to_string(mesh.unread_lists) + " further TRIANGLE_LIST " +
-        (mesh.unread_lists == 1 ? "marker is" : "markers are") +
-        " not read, so that nothing is proved; name the one that is the mesh by marker/namespace and marker/id");
+  if (mesh.unread_markers > 0) {
+    add(std::to_string(mesh.unread_markers) + (mesh.unread_markers == 1 ? " marker" : " markers") +
+        " beside the mesh, the first of which is " + mesh.unread_marker +
+        ", may be things of their own and are not read, so that nothing is proved; name what is the mesh by "
+        "marker/namespace and marker/id");
   }
   add(mesh.camera_hint);
   add(mesh.row_step_hint);

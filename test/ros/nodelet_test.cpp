@@ -33,12 +33,18 @@ struct Subscription : ::testing::Test {
   ros::NodeHandle node;
   ros::CallbackQueue callbacks;
   std::vector<MeshMessage> received;
+  std::uint64_t came = 0;
+  bool throws = false;
 
   std::unique_ptr<MeshSubscription> subscribe(const std::string& topic, const std::string& type) {
     ros::NodeHandle handle(node);
     handle.setCallbackQueue(&callbacks);
-    return std::make_unique<MeshSubscription>(handle, topic, findMeshTypeNamed(type),
-                                              [this](MeshMessage m) { received.push_back(std::move(m)); });
+    return std::make_unique<MeshSubscription>(
+        handle, topic, findMeshTypeNamed(type), [this](std::uint64_t number) { came = number; },
+        [this](MeshMessage m) {
+          if (throws) throw std::bad_alloc();
+          received.push_back(std::move(m));
+        });
   }
   bool serveUntil(std::size_t count) {
     return waitUntil([&] {
@@ -65,6 +71,28 @@ TEST_F(Subscription, ToANamedTypeObjectsArriveFromTheSameProcess) {
     EXPECT_EQ(address(i), sent[i].get()) << "message " << i;
     EXPECT_TRUE(received[i].object.handed_over);
     EXPECT_EQ(received[i].number, i + 1);
+  }
+}
+
+// Its number is told before anything of it is taken: whoever counts knows that one is missing.
+TEST_F(Subscription, OfAMessageThatIsLostTheNumberIsTold) {
+  for (const char* type : {"mesh_stamped", "auto"}) {
+    const std::string topic = std::string("/lost/") + type;
+    const auto subscription = subscribe(topic, type);
+    const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, topic);
+    for (const std::uint64_t number : {1, 2, 3}) {
+      throws = number == 2;
+      const std::size_t before = received.size();
+      publisher.publish(shared(tipAbove(1), 10 + static_cast<double>(number)));
+      ASSERT_TRUE(waitUntil([&] {
+        callbacks.callAvailable(ros::WallDuration(0.01));
+        return came == number;
+      }));
+      EXPECT_EQ(subscription->came(), number);
+      ASSERT_EQ(received.size(), before + (throws ? 0 : 1));
+      if (!throws) EXPECT_EQ(received.back().number, number);
+    }
+    came = 0;
   }
 }
 

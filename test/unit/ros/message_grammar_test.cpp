@@ -404,6 +404,27 @@ TEST_F(MarkerGrammar, OtherTypesAndActions) {
     visualization_msgs::MarkerArray both;
     both.markers = {gone, marker()};
     EXPECT_EQ(read(both).positions.size(), 3u) << "what was there before goes, and what follows is the mesh";
+    EXPECT_EQ(read(both).dropped_faces, 0u);
+  }
+}
+
+// What may be a thing beside the mesh is not passed over in silence.
+TEST_F(MarkerGrammar, ThingsBesideTheMesh) {
+  for (const int type : {0, 1, 2, 3, 6, 9, 10}) {  // ARROW, CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT, MESH_RESOURCE
+    anew();
+    visualization_msgs::MarkerArray both;
+    both.markers = {marker(), marker()};
+    both.markers[1].type = type;
+    both.markers[1].ns = "table";
+    const bool is_drawing = type == 0 || type == 9;
+    const DecodedMesh mesh = read(both);
+    EXPECT_EQ(mesh.unread_markers, is_drawing ? 0u : 1u) << type;
+    EXPECT_EQ(mesh.dropped_faces > 0, !is_drawing) << type;
+    if (!is_drawing) EXPECT_EQ(mesh.unread_marker, "('table', 2), type " + std::to_string(type));
+    config.marker_namespace = "cloth";
+    anew();
+    EXPECT_EQ(read(both).dropped_faces, 0u) << "others are left out by choice";
+    config.marker_namespace.reset();
   }
 }
 
@@ -630,9 +651,17 @@ TEST_F(RopeGrammar, WhatIsDrawnBesides) {
   const visualization_msgs::Marker dots = rope(visualization_msgs::Marker::SPHERE_LIST, {a, b, c}, 1);
   EXPECT_EQ(read(all({dots, strip({a, b, c}, 2)})).positions.size(), 3u) << "points of a rope's lines";
   anew();
-  const DecodedMesh mesh = read(all({strip({a, b, c}, 2), marker()}));
-  EXPECT_TRUE(mesh.topology->hasFaces()) << "lines on a mesh";
-  EXPECT_EQ(mesh.dropped_faces, 0u);
+  anew();
+  const Positions corners = read(marker()).positions;
+  for (const auto& [points, unread] : {std::pair(corners, 0u), {Positions{corners[0], {0, 0, 7}}, 1u}}) {
+    const DecodedMesh mesh = read(all({strip(points, 2), marker()}));
+    EXPECT_TRUE(mesh.topology->hasFaces()) << "lines on a mesh";
+    EXPECT_EQ(mesh.unread_markers, unread) << "lines that leave it may be a rope of their own";
+    EXPECT_EQ(mesh.dropped_faces, unread == 0 ? 0u : points.size());
+  }
+  anew();
+  const DecodedMesh rope_alone = read(all({dots, strip({{5, 5, 5}, b, c}, 2)}));
+  EXPECT_EQ(rope_alone.dropped_faces, 3u) << "one of the points is none of the line's";
   config.marker_namespace = "rope";
   anew();
   EXPECT_FALSE(read(all({strip({a, b, c}, 2), marker()})).topology->hasFaces()) << "lines that are asked for";
