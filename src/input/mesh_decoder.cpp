@@ -73,6 +73,12 @@ Eigen::Affine3d poseAndScaleOf(const MarkerView& marker) {
   return transform;
 }
 
+/// Arrows and texts are none, nor is what is taken away.
+bool mayBeThing(const MarkerView& marker) {
+  return marker.action == MARKER_ADD && marker.type != MARKER_ARROW && marker.type != MARKER_TEXT &&
+         (!isListOfPoints(marker) || marker.points.size > 0);
+}
+
 /// Empty: there is nothing to say.
 std::string rowStepHint(const CloudView& cloud) {
   if (!cloud.wrong_row_step) return {};
@@ -373,7 +379,7 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
         "no " + std::string(config_.source == TopologySource::POLYLINE ? "" : "TRIANGLE_LIST marker and no ") +
         "LINE_STRIP, LINE_LIST or POINTS with the wanted namespace and id; there are (namespace, id, type):" +
         (seen.empty() ? " none" : seen);
-    if (passed_over) throw PassedOver(text);
+    if (passed_over) throw PassedOver(text, std::any_of(markers.begin(), markers.end(), mayBeThing));
     refuse(text);
   }
   if (&taken == &points && config_.source != TopologySource::POLYLINE && !hasFixedTopology()) {
@@ -409,11 +415,9 @@ void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::
     return true;
   };
   for (const MarkerView& marker : markers) {
-    const bool is_thing = marker.type != MARKER_ARROW && marker.type != MARKER_TEXT &&
-                          (!isListOfPoints(marker) || marker.points.size > 0);
     const bool by_choice = config_.source == TopologySource::POLYLINE && marker.type == MARKER_TRIANGLE_LIST;
     const bool is_taken = std::find(taken.begin(), taken.end(), &marker) != taken.end();
-    if (!isWanted(marker) || !is_thing || by_choice || is_taken || isDrawnOfIt(marker)) continue;
+    if (!isWanted(marker) || !mayBeThing(marker) || by_choice || is_taken || isDrawnOfIt(marker)) continue;
     if (mesh.unread_markers++ == 0) mesh.unread_marker = nameOf(marker) + ", type " + std::to_string(marker.type);
     mesh.dropped_faces += marker.type == MARKER_TRIANGLE_LIST ? (marker.points.size + 2) / 3
                                                               : std::max<std::size_t>(marker.points.size, 1);

@@ -51,7 +51,9 @@ struct MeshError : std::runtime_error {
 /// A message of markers that are none of the mesh, by their names or because they only take others away: no frame, and
 /// none is missing.
 struct PassedOver : MeshError {
-  explicit PassedOver(const std::string& text) : MeshError(StepStatus::BAD_MESSAGE, text) {}
+  PassedOver(const std::string& text, bool has_things)
+      : MeshError(StepStatus::BAD_MESSAGE, text), may_be_things(has_things) {}
+  bool may_be_things;  ///< some of them, other than arrows and texts
 };
 
 /// A frame in the coordinates of the message's own frame; stamp_ns is 0 where the message has none.

@@ -90,7 +90,11 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
   } catch (const PassedOver& other) {
-    return passed_over_[body].add(shortText(other.what()));
+    OtherMarkers& others = passed_over_[body];
+    ++others.messages;
+    others.newest = shortText(other.what());
+    others.may_be_things = others.may_be_things || other.may_be_things;
+    return;
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {
@@ -104,7 +108,9 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   refused_[body].clear();
   checked_[body] = waiting.mesh.topology;
   const bool first_hint = !waiting.mesh.row_step_hint.empty() && wrong_row_steps_++ == 0;
-  if (is_new || first_hint) {
+  const std::size_t unread = waiting.mesh.unread_markers;
+  const bool others_unread = std::exchange(passed_over_[body].unread, unread) != unread;
+  if (is_new || first_hint || others_unread) {
     hints_[body] = joined(file_hints_[body], meshHint(waiting.mesh, config_.bodies[body].input));
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;
@@ -189,6 +195,10 @@ void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
   nameMissing(outcome);
   nameUnwatched(outcome);
   nameNewerMap(came_ns, outcome);
+  for (std::size_t b = 0; b < passed_over_.size() && outcome.answered; ++b) {
+    if (!passed_over_[b].may_be_things) continue;
+    outcome.excluded.push_back("messages of other markers on the topic of body '" + config_.bodies[b].body.name + "'");
+  }
   if (!outcome.answered || !outcome.step->map.surface || outcome.step->map.arrival_ns > doubted_map_ns_) return;
   outcome.unproved.push_back("where the octomap's frame was at its stamp is not known (" + map_doubt_ + ")");
 }

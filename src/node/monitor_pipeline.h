@@ -211,10 +211,8 @@ class MonitorPipeline {
   struct OtherMarkers {
     std::uint64_t messages = 0;
     std::string newest;
-    void add(std::string why) {
-      ++messages;
-      newest = std::move(why);
-    }
+    bool may_be_things = false;
+    std::size_t unread = 0;  // beside the last mesh
   };
   std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;

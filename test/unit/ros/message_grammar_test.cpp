@@ -478,10 +478,12 @@ TEST_F(MarkerGrammar, IdsInTurn) {
 }
 
 TEST_F(MarkerGrammar, WhatIsPassedOver) {
+  bool things = false;
   const auto isPassedOver = [&](const auto& message) {
     try {
       read(message);
-    } catch (const PassedOver&) {
+    } catch (const PassedOver& others) {
+      things = others.may_be_things;
       return true;
     } catch (const MeshError&) {
     }
@@ -495,15 +497,22 @@ TEST_F(MarkerGrammar, WhatIsPassedOver) {
   EXPECT_FALSE(isPassedOver(arrow)) << "nothing of this topic is a mesh yet";
   read(marker());
   EXPECT_TRUE(isPassedOver(arrow)) << "drawn besides";
+  EXPECT_FALSE(things);
+  visualization_msgs::Marker cube = arrow;
+  cube.type = visualization_msgs::Marker::CUBE;
+  EXPECT_TRUE(isPassedOver(cube));
+  EXPECT_TRUE(things);
   arrow.id = marker().id;
   EXPECT_FALSE(isPassedOver(arrow)) << "in the place of the mesh";
   EXPECT_TRUE(isPassedOver(gone));
+  EXPECT_FALSE(things);
   EXPECT_FALSE(isPassedOver(other)) << "two meshes, or is it one?";
   anew();
   config.marker_namespace = "cloth";
   visualization_msgs::MarkerArray none, others;
   others.markers = {other, other};
   EXPECT_TRUE(isPassedOver(other));
+  EXPECT_TRUE(things) << "by choice, but things";
   EXPECT_TRUE(isPassedOver(others));
   EXPECT_FALSE(isPassedOver(none)) << "a tracker that sees nothing";
   EXPECT_EQ(read(marker()).positions.size(), 3u);

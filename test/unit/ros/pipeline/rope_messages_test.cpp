@@ -87,6 +87,37 @@ TEST(RopeMessages, AnotherRopeIsASeam) {
   EXPECT_EQ(ropes.outcome.status, StepStatus::FIRST_FRAME);
 }
 
+// One array with a cloth's triangles and a rope, and a cube in a message of its own: nobody looks at either.
+TEST(RopeMessages, WhatNobodyLooksAtIsSaid) {
+  using Marker = visualization_msgs::Marker;
+  Driven cloth(scene());
+  const Positions corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const auto clothAnd = [&](double stamp_s, const Positions& line) {
+    visualization_msgs::MarkerArray out;
+    out.markers = {rope(stamp_s, 1, Marker::TRIANGLE_LIST, corners), rope(stamp_s, 2, Marker::LINE_STRIP, line)};
+    out.markers[0].scale.x = 0;
+    return out;
+  };
+  feed(cloth, clothAnd(1, corners));
+  feed(cloth, clothAnd(1.1, corners));
+  EXPECT_TRUE(assuranceOf(cloth.outcome).clear()) << "its outline: " << cloth.outcome.reason;
+  EXPECT_TRUE(cloth.outcome.excluded.empty());
+  visualization_msgs::MarkerArray cube;
+  cube.markers = {rope(1.15, 7, Marker::CUBE, {})};
+  cube.markers[0].ns = "table";
+  cloth.pipeline.take(0, {ros::message_traits::datatype(cube), bytesOf(cube), 0, 0});
+  EXPECT_FALSE(cloth.pipeline.nextOutcome(0, cloth.outcome)) << "no frame";
+  feed(cloth, clothAnd(1.2, corners));
+  EXPECT_TRUE(assuranceOf(cloth.outcome).clear()) << cloth.outcome.reason;
+  EXPECT_EQ(cloth.outcome.excluded, std::vector<std::string>{"messages of other markers on the topic of body 'mesh'"});
+  feed(cloth, clothAnd(1.3, {{0.2, 0.2, 0.5}, {0.2, 0.2, -0.5}}));
+  EXPECT_EQ(cloth.outcome.status, StepStatus::PARTIAL) << "a rope through it";
+  EXPECT_FALSE(assuranceOf(cloth.outcome).proved);
+  EXPECT_NE(cloth.pipeline.hint(0).find("1 marker beside the mesh, the first of which is ('', 2), type 4"),
+            std::string::npos)
+      << cloth.pipeline.hint(0);
+}
+
 TEST(RopeMessages, PosesOfARopeThatCrossesItself) {
   const auto poses = [](double stamp_s, double z) {
     geometry_msgs::PoseArray out;
