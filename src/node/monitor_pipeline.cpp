@@ -90,11 +90,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
   } catch (const PassedOver& other) {
-    OtherMarkers& others = passed_over_[body];
-    ++others.messages;
-    others.newest = shortText(other.what());
-    others.may_be_things = others.may_be_things || other.may_be_things;
-    return;
+    return passed_over_[body].add(other);
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {
@@ -107,12 +103,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   }
   refused_[body].clear();
   checked_[body] = waiting.mesh.topology;
-  const bool first_hint = !waiting.mesh.row_step_hint.empty() && wrong_row_steps_++ == 0;
-  const std::size_t unread = waiting.mesh.unread_markers;
-  const bool others_unread = std::exchange(passed_over_[body].unread, unread) != unread;
-  if (is_new || first_hint || others_unread) {
-    hints_[body] = joined(file_hints_[body], meshHint(waiting.mesh, config_.bodies[body].input));
-  }
+  keepHint(body, waiting.mesh, is_new);
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
   monitor_->countReceived(body, 1, unstamped);
@@ -125,6 +116,20 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     waiting.reason = std::move(waiting_[body]->reason);
   }
   waiting_[body] = std::move(waiting);
+}
+
+void MonitorPipeline::OtherMarkers::add(const PassedOver& message) {
+  ++messages;
+  newest = shortText(message.what());
+  may_be_things = may_be_things || message.may_be_things;
+}
+
+/// Again where something else is to be said of it than of the last one.
+void MonitorPipeline::keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new) {
+  const bool first_wrong = !mesh.row_step_hint.empty() && wrong_row_steps_++ == 0;
+  const bool others_unread = std::exchange(passed_over_[body].unread, mesh.unread_markers) != mesh.unread_markers;
+  if (!is_new && !first_wrong && !others_unread) return;
+  hints_[body] = joined(file_hints_[body], meshHint(mesh, config_.bodies[body].input));
 }
 
 void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change) {

@@ -213,11 +213,13 @@ class MonitorPipeline {
     std::string newest;
     bool may_be_things = false;
     std::size_t unread = 0;  // beside the last mesh
+    void add(const PassedOver& message);
   };
   std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;
 
   void loadFiles();
+  void keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new);
   void voidWhatWasSaid(const std::string& why);
   void setRigid(std::size_t body, const MeshResource& mesh);
   static Rigid rigidOf(const MeshResource& mesh);
