@@ -156,6 +156,32 @@ void readClearance(ParameterReader section, MonitorConfig& config) {
   section.finish();
 }
 
+/// What of clouds and depth pictures nobody looks at, by their limits.
+std::vector<std::string> beyondLimits(const MonitorConfig& config) {
+  std::vector<std::string> sentences;
+  const auto add = [&](const std::string& what, double limit_m, const std::string& parameter) {
+    std::ostringstream text;
+    text << what << limit_m << " m by " << parameter;
+    sentences.push_back(text.str());
+  };
+  const CloudMapOptions& clouds = config.cloud_map;
+  if (config.takesClouds()) {
+    if (clouds.max_range_m > 0) add("what clouds show farther than ", clouds.max_range_m, "obstacle_max_range_m");
+    if (clouds.min_range_m > DEFAULT_MIN_RANGE_M)
+      add("what clouds show nearer than ", clouds.min_range_m, "obstacle_min_range_m");
+    if (clouds.box) sentences.emplace_back("what clouds show outside of obstacle_box");
+  }
+  for (const BodyConfig& body : config.bodies) {
+    if (body.input.source != TopologySource::DEPTH_IMAGE) continue;
+    const DepthSurfaceOptions &depth = body.input.depth, plain;
+    const std::string what = "what the picture of body '" + body.body.name + "' shows ";
+    const std::string section = "topology/";
+    if (depth.max_range_m > 0) add(what + "farther than ", depth.max_range_m, section + "max_range_m");
+    if (depth.min_range_m > plain.min_range_m) add(what + "nearer than ", depth.min_range_m, section + "min_range_m");
+  }
+  return sentences;
+}
+
 /// What an effect that is off takes away before a step is made, so that no body of a step tells of it. What bodies tell
 /// of (self_collision, body_body, octomap) is not named twice.
 std::vector<std::string> takenAway(const MonitorConfig& config) {
@@ -177,7 +203,9 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
 
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
-  config.monitor.detector.excluded = takenAway(config);
+  std::vector<std::string>& excluded = config.monitor.detector.excluded;
+  excluded = takenAway(config);
+  for (std::string& sentence : beyondLimits(config)) excluded.push_back(std::move(sentence));
   const auto off = [&](Effect effect) { return settingOf(config.effects, effect) == EffectSetting::OFF; };
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {

@@ -99,6 +99,26 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   EXPECT_FALSE(off.holdsDistance());
 }
 
+TEST(Parameters, WhatLimitsLeaveOutOfCloudsAndPicturesIsSaid) {
+  const auto excludedBy = [](const std::string& text) {
+    return readConfig(parameters(text)).monitor.detector.excluded;
+  };
+  EXPECT_EQ(excludedBy("obstacle_cloud_topic: /points, obstacle_min_range_m: 0.3, obstacle_max_range_m: 2.5, "
+                       "obstacle_box: [0, 0, 0, 1, 1, 1]"),
+            (std::vector<std::string>{"what clouds show farther than 2.5 m by obstacle_max_range_m",
+                                      "what clouds show nearer than 0.3 m by obstacle_min_range_m",
+                                      "what clouds show outside of obstacle_box"}));
+  EXPECT_TRUE(excludedBy("obstacle_cloud_topic: /points, obstacle_max_range_m: 0.0").empty());
+  const std::string picture = "bodies: {cloth: {topic: cloth}, seen: {motion: static, topology: {source: depth_image, ";
+  EXPECT_EQ(excludedBy(picture + "max_range_m: 4.0, min_range_m: 0.5}}}"),
+            (std::vector<std::string>{
+                "what the picture of body 'seen' shows farther than 4 m by topology/max_range_m",
+                "what the picture of body 'seen' shows nearer than 0.5 m by "
+                "topology/min_range_m",
+            }));
+  EXPECT_TRUE(excludedBy(picture + "stride: 2}}}").empty());
+}
+
 TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
   const MonitorConfig config = readConfig(
       parameters("bodies: {a_finger: {rigid: {mesh: no_such_file.stl, frame: finger}}, cloth: {topic: cloth}}, "
