@@ -155,8 +155,6 @@ endif()
 foreach(tool cell_publisher cell_octomap_server)
   add_executable(${tool} EXCLUDE_FROM_ALL benchmark/${tool}.cpp)
   add_dependencies(${tool} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
-  # No test runs them, but each run of the tests sees that they compile.
-  add_dependencies(tests ${tool})
   target_include_directories(${tool} PRIVATE src benchmark)
   target_include_directories(${tool} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
   target_link_libraries(${tool} PRIVATE deformable_ccd_ros ${ROS_LINK_LIBRARIES} CLI11::CLI11

@@ -277,9 +277,9 @@ class CommandsTest(unittest.TestCase):
             self.assertRegex(text, r'(?<![\w-])%s(?![\w-])' % re.escape(option))
 
     def compile(self, command):
-        """On the checkout itself; the tree of the build is nobody's. It lets go first what else runs: that has deadlines."""
+        """On the checkout itself, without optimising, in half the time. It lets go first what else runs: that has deadlines."""
         line = 'cd %s && %s && ls /usr/local/lib/libdeformable_ccd.so' % (CHECKOUT, command)
-        return self.runs('nice -n 19 bash -c ' + shlex.quote(line), 900)
+        return self.runs('CMAKE_BUILD_TYPE=Debug nice -n 19 bash -c ' + shlex.quote(line), 900)
 
     def one(self, command):
         words = command.split()

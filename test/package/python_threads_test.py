@@ -26,8 +26,10 @@ body = dccd.Body(t0, t1, np.arange(90000).reshape(-1, 3))
 
 class ThreadsTest(PythonTestCase):
     def start(self, program):
+        # Whoever started this in the background of a shell has Ctrl-C ignored, and so have its children.
         process = subprocess.Popen([sys.executable, '-c', LONG_STEP + textwrap.dedent(program)], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
+                                   stderr=subprocess.PIPE, text=True,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
         self.addCleanup(process.communicate)
         self.addCleanup(process.kill)
         return process
