@@ -193,6 +193,18 @@ void TransformFeed::forEachKeptOnWay(Take take) const {
   }
 }
 
+std::optional<TransformFeed::Ahead> TransformFeed::mostAhead(const std::string& target,
+                                                             const std::string& source) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::optional<Ahead> most;
+  if (!findWay(target, source, newestParentOf)) return most;
+  forEachKeptOnWay([&](const Frame& frame) {
+    const std::optional<double> seconds = frame.lead.seconds();
+    if (seconds && (!most || *seconds > most->seconds)) most = Ahead{frame.name, *seconds};
+  });
+  return most;
+}
+
 std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                                   StampNs to_ns, std::vector<NewParent>& changes) const {
   const std::lock_guard<std::mutex> lock(mutex_);

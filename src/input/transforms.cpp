@@ -200,7 +200,8 @@ std::vector<std::string> TransformFeed::takeProblems() {
   return std::exchange(problems_, {});
 }
 
-bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender) {
+bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender,
+                        StampNs arrival_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   bool cleared = false;
   for (const auto& transform : message.transforms) {
@@ -229,6 +230,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
     } else {
       const Jump jump = jumpOf(transform, *sent.sender);
       const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+      frame->lead.add(stamp_ns, arrival_ns);
       const bool hides_later = jump != Jump::NONE && frame->sent.rbegin()->first <= stamp_ns + JUMP_BACK_NS;
       const bool is_full = kept_count_ >= max_kept_;
       cleared = cleared || is_full || jump != Jump::NONE;

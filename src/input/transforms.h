@@ -18,6 +18,7 @@
 
 #include "dccd/mesh_store.h"
 #include "dccd/tolerances.h"
+#include "input/stamp_lead.h"
 
 namespace dccd {
 
@@ -50,8 +51,8 @@ class TransformFeed {
   void lose(bool is_static);
   /// Whether add() would forget what this publisher sent. `sender`: the caller's id of its connection.
   bool clears(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender = {}) const;
-  /// Returns true when transforms were forgotten.
-  bool add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender = {});
+  /// Returns true when transforms were forgotten. arrival_ns: on the clock of stamps; 0: it is not known.
+  bool add(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender = {}, StampNs arrival_ns = 0);
 
   /// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no
   /// transform. A transform of this very stamp is taken as it was sent; tf2 alone would interpolate from it to the next
@@ -72,6 +73,14 @@ class TransformFeed {
                                      StampNs to_ns, std::vector<NewParent>& changes) const;
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
   std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
+
+  /// Of the frames that target_from_source is made of now, that of which the stamps run ahead of their arrival by the
+  /// most [s]; none: nobody knows.
+  struct Ahead {
+    std::string frame;
+    double seconds;
+  };
+  std::optional<Ahead> mostAhead(const std::string& target, const std::string& source) const;
 
   /// How often where frames were before was forgotten.
   std::uint64_t timesForgotten() const { return times_forgotten_; }
@@ -109,6 +118,7 @@ class TransformFeed {
     bool passed_over = false;               ///< something came for a time after the newest, and is not used
     std::uint64_t lost = 0;                 ///< lost_ when the newest came
     bool is_disputed = false;               ///< it is on both topics, and not at one place
+    StampLead lead;                         ///< of one that moves
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;
     mutable StampNs asked_ns = 0;

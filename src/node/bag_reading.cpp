@@ -225,7 +225,7 @@ void TransformWindow::feedUntil(const ros::Time& at) {
     const ros::Time recorded = next_->getTime();
     const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);
     if (waiting_ && feed_.clears(*waiting_, false, next_->getCallerId()) && !due) return;
-    if (waiting_) feed_.add(*waiting_, false, next_->getCallerId());
+    if (waiting_) feed_.add(*waiting_, false, next_->getCallerId(), static_cast<StampNs>(recorded.toNSec()));
     waiting_.reset();
   }
 }

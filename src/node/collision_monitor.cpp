@@ -111,7 +111,8 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
   if (tf_drops[is_static].mayLack(input_callbacks)) feed.lose(is_static);
   const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(*event.getConstMessage()));
-  if (message) feed.add(*message, is_static, event.getPublisherName());
+  const auto arrival_ns = static_cast<StampNs>(ros::Time::now().toNSec());
+  if (message) feed.add(*message, is_static, event.getPublisherName(), arrival_ns);
   for (const std::string& line : feed.takeProblems()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 } catch (const std::exception& error) {
   feed.lose(is_static);

@@ -32,6 +32,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   static_meshes_.resize(config_.bodies.size());
   passed_over_.resize(config_.bodies.size());
   came_.resize(config_.bodies.size());
+  sources_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {
@@ -106,6 +107,9 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   keepHint(body, waiting.mesh, is_new);
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
+  Source& source = sources_[body];
+  source.lead.add(waiting.mesh.stamp_ns, message.receipt_ns);
+  if (source.frame != waiting.mesh.frame_id) source.frame = waiting.mesh.frame_id;
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changes;
   points_no_measurement_ += waiting.mesh.no_measurement;
@@ -200,6 +204,7 @@ void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
   nameMissing(outcome);
   nameUnwatched(outcome);
   nameNewerMap(came_ns, outcome);
+  nameClocks(outcome);
   for (std::size_t b = 0; b < passed_over_.size() && outcome.answered; ++b) {
     if (!passed_over_[b].may_be_things) continue;
     outcome.excluded.push_back("messages of other markers on the topic of body '" + config_.bodies[b].body.name + "'");

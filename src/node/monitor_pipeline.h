@@ -178,6 +178,11 @@ class MonitorPipeline {
   std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;         // a static body of which the monitor has a frame
   std::vector<std::uint64_t> came_;  // per body, the number of its last message
+  struct Source {
+    StampLead lead;
+    std::string frame;  // of the last message
+  };
+  std::vector<Source> sources_;  // per body
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
   std::vector<std::optional<Rigid>> rigid_;
   std::vector<std::optional<Attached>> attached_;
@@ -249,6 +254,8 @@ class MonitorPipeline {
   /// All that a step cannot show by itself, also of one that nobody but a service asked for. `came_ns`: arrival of its
   /// frame; what came up to then had to be used.
   void nameShortcomings(std::int64_t came_ns, Outcome& outcome);
+  /// Says where stamps are of the clocks of two computers that differ.
+  void nameClocks(Outcome& outcome) const;
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
   /// Puts the room beside straight paths into the frame's radii, by max_acceleration_m_s2.

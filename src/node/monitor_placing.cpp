@@ -1,14 +1,25 @@
 // Where bodies are: frames and rigid bodies wait for their transforms and are moved into the fixed frame, which may be
 // learnt, and learnt anew.
 #include <algorithm>
+#include <cmath>
+#include <iomanip>
 #include <limits>
 #include <optional>
+#include <set>
+#include <sstream>
 #include <utility>
 
 #include "input/transform_tracks.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
+namespace {
+
+// What is stamped later than it comes is stamped by another clock. Two that are kept alike by NTP differ by less; what
+// they differ by is how far things are from where they are taken to be at one time.
+constexpr double MOST_AHEAD_S = 0.25;
+
+}  // namespace
 
 Carrier MonitorPipeline::carrierOf(const std::string& frame, std::uint64_t epoch) const {
   return {frame == fixed_frame_ ? std::string() : frame, epoch};
@@ -120,6 +131,35 @@ void MonitorPipeline::nameNewerMap(std::int64_t came_ns, Outcome& outcome) const
                                one.map.frame_id + "' at " + secondsOf(one.map.stamp_ns) +
                                "; raise transform_timeout_s to what tf lags behind");
     return;
+  }
+}
+
+/// Where all stamps are ahead alike, it is the clock here that is behind, and nothing is apart in time.
+void MonitorPipeline::nameClocks(Outcome& outcome) const {
+  const std::optional<double> clock_s = sources_[config_.monitor.clock_body].lead.seconds();
+  if (!outcome.answered || !clock_s) return;
+  const auto look = [&](const std::string& name, double ahead_s) {
+    if (!(ahead_s > MOST_AHEAD_S && ahead_s - *clock_s > MOST_AHEAD_S)) return;
+    std::ostringstream text;
+    text << std::setprecision(3) << "stamps of " << name << " are up to " << ahead_s
+         << " s later than they come, those of body '" << config_.bodies[config_.monitor.clock_body].body.name << "' "
+         << std::abs(*clock_s) << (*clock_s > 0 ? " s" : " s earlier")
+         << ": clocks of two computers differ; synchronise them";
+    outcome.unproved.push_back(text.str());
+  };
+  std::set<std::string> frames = monitor_->heldFrames();
+  for (const std::optional<Rigid>& rigid : rigid_) {
+    if (rigid && !rigid->isNone()) frames.insert(rigid->frame);
+  }
+  for (std::size_t b = 0; b < sources_.size(); ++b) {
+    if (isStatic(b)) continue;
+    if (!sources_[b].frame.empty()) frames.insert(sources_[b].frame);
+    if (const auto ahead_s = sources_[b].lead.seconds()) look("body '" + config_.bodies[b].body.name + "'", *ahead_s);
+  }
+  std::set<std::string> told;
+  for (const std::string& frame : frames) {
+    const std::optional<TransformFeed::Ahead> ahead = transforms_.mostAhead(fixed_frame_, frame);
+    if (ahead && told.insert(ahead->frame).second) look("the frame '" + ahead->frame + "'", ahead->seconds);
   }
 }
 
