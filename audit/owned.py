@@ -114,20 +114,20 @@ class Owned:
         for p, q, surface in ways:
             elements = surface.faces if len(surface.faces) else surface.edges[:, [0, 1, 1]]
             p, q = placed.carried(back, p), placed.carried(back, q)
-            far = np.nanmax(np.linalg.norm(q - p, axis=1), initial=0)
+            far = np.nanmax(touches.length(q - p), initial=0)
             many = 0 if far == 0 else 1 if sure else 1 + int(min(64, 4 * far / resolution))
             within = reach - resolution / 2 - tolerance if sure else reach + 0.8661 * resolution + far / max(1, many) + tolerance
-            for i in range(many + 1):
-                at = (p + (q - p) * (i / max(1, many)))[elements]
-                at = at[np.isfinite(at).all((1, 2))]
-                left = np.nonzero(~found)[0]
-                if not len(at) or not len(left):
-                    continue
-                which = touches.overlapping(middle[left] - within, middle[left] + within, at.min(1), at.max(1))
-                near = touches.point_to_face(middle[left[which[:, 0]]], at[which[:, 1]]) <= within
-                found[left[which[near, 0]]] = True
-                if solid and surface.closed:
-                    found[left] |= ((middle[left] >= at.min((0, 1))) & (middle[left] <= at.max((0, 1)))).all(1)
+            places = p[elements] + (q - p)[elements] * np.linspace(0, 1, many + 1)[:, None, None, None]
+            at = places[np.isfinite(places).all((2, 3))]
+            left = np.nonzero(~found)[0]
+            if not len(at) or not len(left):
+                continue
+            which = touches.overlapping(middle[left] - within, middle[left] + within, at.min(1), at.max(1))
+            near = touches.point_to_face(middle[left[which[:, 0]]], at[which[:, 1]]) <= within
+            found[left[which[near, 0]]] = True
+            if solid and surface.closed:
+                low, high = np.nanmin(places, (1, 2)), np.nanmax(places, (1, 2))
+                found[left] |= ((middle[left][:, None] >= low) & (middle[left][:, None] <= high)).all(2).any(1)
         return found
 
     def follow(self):

@@ -18,6 +18,16 @@ class Unknown(Exception):
     """Nobody saw where it was; a claim that says so is refuted."""
 
 
+def once(question):
+    """Is asked once, as long as what is judged stays the same."""
+    def asked(self, *words):
+        key = self, question, words
+        if key not in self.memory:
+            self.memory[key] = question(self, *words)
+        return self.memory[key]
+    return asked
+
+
 @dataclass
 class Sample:
     stamp: int
@@ -82,7 +92,7 @@ class Transforms:
 
     def judge(self, said, ahead, begun):
         """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
-        self.said, self.read, self.begun, self.poses = said, said + ahead, begun, {}
+        self.said, self.read, self.begun, self.memory = said, said + ahead, begun, {}
 
     def have_statics_from_start(self):
         for samples in self.static.values():
@@ -91,6 +101,7 @@ class Transforms:
     def known(self, samples):
         return [s for s in samples if s.came <= (self.said if s.static else self.read)]
 
+    @once
     def around(self, child, stamp):
         """The two samples that a joint's place at a stamp rests on, or twice the one that it is."""
         fixed, moving = self.known(self.static.get(child, [])), self.samples.get(child, [])
@@ -122,6 +133,7 @@ class Transforms:
             raise Unknown('frame %s changes its parent at %.9f s' % (child, stamp / NS))
         return moving[i], moving[j]
 
+    @once
     def chain(self, frame, fixed, stamp):
         """Joints from `frame` up to where it meets the way of the fixed one, and those of the fixed one: (child, a, b)."""
         ways = []
@@ -139,22 +151,21 @@ class Transforms:
             raise Unknown('no transform from %s to %s' % (frame, fixed))
         return up[:names.index(meet)], down[:others.index(meet)]
 
+    @once
     def pose(self, frame, fixed, stamp):
         """4 x 4, or None where the frame is the fixed one."""
         if frame == fixed:
             return None
-        key = frame, fixed, stamp
-        if key not in self.poses:
-            ways = []
-            for way in self.chain(frame, fixed, stamp):
-                m = np.eye(4)
-                for _, a, b in way:
-                    share = (stamp - a.stamp) / (b.stamp - a.stamp) if a is not b and a.stamp != b.stamp else 0.0
-                    m = (between(a, b, share) if share else matrix(a.translation, a.rotation)) @ m
-                ways.append(m)
-            self.poses[key] = np.linalg.inv(ways[1]) @ ways[0]
-        return self.poses[key]
+        ways = []
+        for way in self.chain(frame, fixed, stamp):
+            m = np.eye(4)
+            for _, a, b in way:
+                share = (stamp - a.stamp) / (b.stamp - a.stamp) if a.stamp != b.stamp else 0.0
+                m = (between(a, b, share) if share else matrix(a.translation, a.rotation)) @ m
+            ways.append(m)
+        return np.linalg.inv(ways[1]) @ ways[0]
 
+    @once
     def knots(self, frame, fixed, start, end):
         """Stamps of the samples within the step; one that cannot be used, around it, is a place that nobody knows."""
         if frame == fixed:
@@ -173,6 +184,7 @@ class Transforms:
             found |= {s.stamp for s in within}
         return sorted(found)
 
+    @once
     def still(self, frame, fixed, start, end):
         """Does the chain not move in the step? Only then is a straight way in it a straight way."""
         if frame == fixed:
@@ -184,6 +196,7 @@ class Transforms:
 class Track:
     """One body: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen of it."""
     moves = True
+    memory = property(lambda self: self.transforms.memory)
 
     def turns(self, start, end):
         return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
@@ -227,6 +240,7 @@ class Stream(Track):
             self.taken += 1
         return self.held
 
+    @once
     def around(self, start, end):
         """The frames that a step from start to end rests on."""
         said, every = self.transforms.said, self.known()
@@ -257,12 +271,14 @@ class Stream(Track):
     def unchecked(self, start, end):
         return max(f.unchecked for f in self.around(start, end))
 
+    @once
     def knots(self, start, end):
         frames = self.around(start, end)
         if len({f.frame for f in frames}) > 1:
             raise Unknown('%s comes in another frame within the step, and nobody says how it went' % self.name)
         return [f.stamp for f in frames if start < f.stamp < end] + self.transforms.knots(frames[0].frame, self.fixed, start, end)
 
+    @once
     def at(self, stamp, start, end):
         frames = self.around(start, end)
         i = bisect.bisect_left([f.stamp for f in frames], stamp)
@@ -293,6 +309,7 @@ class Held(Stream):
         super().__init__(*words)
         self.tolerance, self.timeout = tolerance, timeout
 
+    @once
     def around(self, start, end):
         said = self.transforms.said
         came = [f for f in self.every if f.came <= said]
@@ -304,6 +321,7 @@ class Held(Stream):
             raise NotCovered('%s comes more often than each max_step_s, and came anew within answer_timeout_s' % self.name)
         return came[-1:]
 
+    @once
     def knots(self, start, end):
         frame, t = self.around(start, end)[0], self.transforms
         held = self.at(start, start, end)
@@ -316,6 +334,7 @@ class Held(Stream):
             raise Unknown('tf has %s elsewhere in the step than where its frame was' % self.name)
         return []
 
+    @once
     def at(self, stamp, start, end):
         frame = self.around(start, end)[0]
         return carried(self.transforms.pose(frame.frame, self.fixed, frame.stamp), frame.positions)
@@ -343,9 +362,11 @@ class Rigid(Track):
     def unchecked(self, start, end):
         return self.lost
 
+    @once
     def knots(self, start, end):
         return self.transforms.knots(self.frame, self.fixed, start, end)
 
+    @once
     def at(self, stamp, start, end):
         return carried(self.transforms.pose(self.frame, self.fixed, stamp), self.positions)
 
