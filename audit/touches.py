@@ -94,14 +94,14 @@ class Root:
     """A root of `p` in [low, high]: low = high, or the only one in (low, high], and not high."""
 
     def __init__(self, p, low, high):
-        self.p, self.low, self.high = p, low, high
+        self.p, self.low, self.high, self.after = p, low, high, sign(at(p, high))
 
     def halve(self):
         middle = (self.low + self.high) / 2
         here = sign(at(self.p, middle))
         if here == 0:
             self.low = self.high = middle
-        elif here == sign(at(self.p, self.high)):
+        elif here == self.after:
             self.high = middle
         else:
             self.low = middle
@@ -215,8 +215,8 @@ def first_touch(kind, starts, ends):
     return next((r for r in times_ if meets(r, *p)), None)
 
 
-def narrow(root, bits=64):
-    """The root, to 2^-64: to be said, and to put roots into an order."""
+def narrow(root, bits=40):
+    """The root, to 2^-40: to be said, and to put roots into an order."""
     while root.high - root.low > Fraction(1, 1 << bits):
         root.halve()
     return root.high
@@ -252,7 +252,9 @@ def overlapping(low_a, high_a, low_b, high_b, same=False):
         last = np.searchsorted(keys, high_a[mine, axis].max(), 'right')
         for at_ in range(first, last, 8192):
             theirs = order_b[at_:min(at_ + 8192, last)]
-            meet = ((low_a[mine][:, None] <= high_b[theirs]) & (low_b[theirs] <= high_a[mine][:, None])).all(2)
+            meet = np.ones((len(mine), len(theirs)), bool)
+            for la, ha, lb, hb in zip(low_a[mine].T, high_a[mine].T, low_b[theirs].T, high_b[theirs].T):
+                meet &= (la[:, None] <= hb) & (lb <= ha[:, None])
             i, j = np.nonzero(meet)
             found.append(np.stack([mine[i], theirs[j]], 1))
     pairs = np.concatenate(found) if found else np.empty((0, 2), int)
