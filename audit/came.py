@@ -56,7 +56,8 @@ class Frame:
     frame: str
     positions: np.ndarray
     surface: Surface = None
-    unchecked: int = 0
+    unseen: np.ndarray = None  # of each vertex: it is not finite, or of no edge
+    unchecked: int = 0         # faces that could not be used
     came: int = 0    # [ns] when the bag has it
     number: int = 0  # place among all messages
 
@@ -156,10 +157,8 @@ class Reader:
         if self.known is not None and surface is not self.known and surface.same_as(self.known):
             surface = self.known
         self.known = surface
-        lost = ~np.isfinite(positions).all(1)
-        bare = np.ones(len(positions), bool)
-        bare[surface.used] = False
-        return Frame(stamp, name, positions, surface, unchecked + int((lost | bare).sum()), came, number)
+        unseen = ~np.isfinite(positions).all(1) | ~np.isin(np.arange(len(positions)), surface.used)
+        return Frame(stamp, name, positions, surface, unseen, unchecked, came, number)
 
     def topology(self):
         said = self.settings.get('topology', {})
@@ -236,16 +235,13 @@ class Reader:
         corners = self.placed(soup[0], True)
         if len(corners) % 3:
             raise Refused('no whole number of triangles')
-        if self.settings.get('weld', 'on') in ('off', False):
-            index = np.arange(len(corners))
-        else:
-            if self.weld is None or len(self.weld) != len(corners):
-                self.weld = welded(corners)[1]
-            first = np.unique(self.weld, return_index=True)[1]
-            if not (corners[first][self.weld] == corners).all():
-                raise NotCovered('welded corners that come apart')
-            index, corners = self.weld, corners[first]
-        faces, lost = fans(index.reshape(-1, 3).tolist(), corners)
+        if self.weld is None or len(self.weld) != len(corners):
+            self.weld = welded(corners)[1]
+        first = np.unique(self.weld, return_index=True)[1]
+        if not (corners[first][self.weld] == corners).all():
+            raise NotCovered('welded corners that come apart')
+        corners = corners[first]
+        faces, lost = fans(self.weld.reshape(-1, 3).tolist(), corners)
         return corners, self.reuse(('soup', faces.tobytes()), lambda: Surface(len(corners), faces)), lost
 
     def ropes(self, markers):
@@ -384,13 +380,12 @@ def read_ply(path):
 
 
 def links(path, files):
-    """Each collision element of a URDF: link, positions, surface, lost, and how far its round parts lie within the true ones."""
+    """Each collision element of a URDF: link, positions, surface, lost. Of what is round a mesh that lies within it."""
     tree = xml.parse(path).getroot()
     for link in tree.findall('link'):
         for element in link.findall('collision'):
             shape = element.find('geometry')[0]
             numbers = lambda name, default='0 0 0', of=shape: [float(w) for w in of.get(name, default).split()]
-            rough = 0.0
             if shape.tag == 'box':
                 points, lost = np.array([[x, y, z] for z in (-.5, .5) for y in (-.5, .5) for x in (-.5, .5)]) * numbers('size'), 0
                 faces = [f for a, b, c, d in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -409,7 +404,7 @@ def links(path, files):
                     a, b, c, d = 32 * k + i, 32 * k + (i + 1) % 32, 32 * k + 32 + i, 32 * k + 32 + (i + 1) % 32
                     faces += [np.stack([a, b, c], 1), np.stack([b, d, c], 1)]
                 faces += [np.stack([0 * i + top, (i + 1) % 32, i], 1), np.stack([0 * i + top + 1, top - 32 + i, top - 32 + (i + 1) % 32], 1)]
-                surface, rough = Surface(len(points), np.concatenate(faces)), radius * 0.0049
+                surface = Surface(len(points), np.concatenate(faces))
             elif shape.tag == 'mesh':
                 points, surface, lost = files.mesh(shape.get('filename'))
                 points = points * numbers('scale', '1 1 1')
@@ -421,7 +416,7 @@ def links(path, files):
                 (cr, cp, cy), (sr, sp, sy) = np.cos([r, p, y]), np.sin([r, p, y])
                 q = (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
                 points = turned(q, points) + numbers('xyz', of=origin)
-            yield link.get('name'), points, surface, lost, rough
+            yield link.get('name'), points, surface, lost
 
 
 # -- octomaps -----------------------------------------------------------------------------------------------------------

@@ -18,6 +18,10 @@ class Unknown(Exception):
     """Nobody saw where it was; a claim that says so is refuted."""
 
 
+class NotSent(Unknown):
+    """No sample of it came for that time."""
+
+
 def once(question):
     """Is asked once, as long as what is judged stays the same."""
     def asked(self, *words):
@@ -123,7 +127,7 @@ class Transforms:
         while j < len(moving) and moving[j].came > self.read:
             j += 1
         if i < 0 or j == len(moving):
-            raise Unknown('no transform of %s at %.9f s' % (child, stamp / NS))
+            raise NotSent('no transform of %s at %.9f s' % (child, stamp / NS))
         i, j = (bisect.bisect_left(stamps, stamps[k]) for k in (i, j))  # of one stamp the first that came
         for k in (i, j):
             for other in moving[k:bisect.bisect_right(stamps, stamps[k])]:
@@ -268,8 +272,9 @@ class Stream(Track):
     def surface(self, start, end):
         return self.around(start, end)[0].surface
 
-    def unchecked(self, start, end):
-        return max(f.unchecked for f in self.around(start, end))
+    def unchecked(self, start, end, mask):
+        """How much of it cannot be looked at, but for these vertices."""
+        return sum(f.unchecked + np.delete(f.unseen, [v for v in mask if v < len(f.unseen)]).sum() for f in self.around(start, end))
 
     @once
     def knots(self, start, end):
@@ -328,7 +333,7 @@ class Held(Stream):
         try:
             knots = t.knots(frame.frame, self.fixed, start, end)
             off = [np.abs(carried(t.pose(frame.frame, self.fixed, s), frame.positions) - held).max() for s in halves([start] + knots + [end])]
-        except Unknown:
+        except NotSent:
             return []  # what is not sent any more counts as at rest
         if max(off) > 2 * self.tolerance:
             raise Unknown('tf has %s elsewhere in the step than where its frame was' % self.name)
@@ -352,14 +357,14 @@ class Held(Stream):
 class Rigid(Track):
     """A mesh that a tf frame carries."""
 
-    def __init__(self, name, positions, surface, lost, frame, transforms, fixed, rough=0.0):
-        self.name, self.positions, self.mesh, self.lost, self.rough = name, positions, surface, lost, rough
+    def __init__(self, name, positions, surface, lost, frame, transforms, fixed):
+        self.name, self.positions, self.mesh, self.lost = name, positions, surface, lost
         self.frame, self.transforms, self.fixed = frame, transforms, fixed
 
     def surface(self, start, end):
         return self.mesh
 
-    def unchecked(self, start, end):
+    def unchecked(self, start, end, mask):
         return self.lost
 
     @once
