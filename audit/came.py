@@ -105,14 +105,14 @@ def welded(corners):
 # -- messages -----------------------------------------------------------------------------------------------------------
 
 
-def cloud_points(message):
+def cloud_points(message, names='xyz'):
     fields = {f.name: f for f in message.fields}
     n, order = message.height * message.width, '>' if message.is_bigendian else '<'
     row = message.row_step if message.height > 1 else message.width * message.point_step
     if message.height > 1 and len(message.data) == n * message.point_step:
         row = message.width * message.point_step
     columns = []
-    for name in 'xyz':
+    for name in names:
         if name not in fields or fields[name].datatype not in (7, 8):
             raise Refused('no field %s of floats' % name)
         kind = np.dtype(order + ('f4' if fields[name].datatype == 7 else 'f8'))
@@ -122,6 +122,18 @@ def cloud_points(message):
         columns.append(np.ndarray((message.height, message.width), kind, message.data, fields[name].offset,
                                   (row, message.point_step)).astype(float).ravel())
     return np.stack(columns, 1)
+
+
+def viewpoint(message, points):
+    """Where the points of a cloud were seen from, in its frame: one place, or None."""
+    names = 'vp_x', 'vp_y', 'vp_z'
+    if not {f.name for f in message.fields}.issuperset(names):
+        return None
+    places = cloud_points(message, names)
+    places = np.unique(places[np.isfinite(places).all(1) & np.isfinite(points).all(1)], axis=0)
+    if len(places) > 1:
+        raise Refused('its points were seen from different places')
+    return places if len(places) else None
 
 
 def turned(q, points):
@@ -436,6 +448,7 @@ class Map:
     came: int = 0
     number: int = 0
     problem: str = ''  # why it cannot be read
+    rays: tuple = ((), ())  # of a cloud, where its sensor was, and the points
     free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
 
     @property

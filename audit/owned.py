@@ -13,7 +13,7 @@ from came import NotCovered
 from placed import NS, Unknown
 
 MOST_VOXELS = 4000000
-NONE = np.empty(0, np.int64)
+NONE, EVER = np.empty(0, np.int64), 1 << 62
 
 
 def packed(keys):
@@ -76,12 +76,30 @@ class Owned:
     def __init__(self, world, reach, lag, trust):
         self.world, self.reach, self.lag, self.trust = world, reach, int(lag * NS), trust
         self.of = {}  # by the map's number: what may be own, what may be in doubt
-        self.every = {name: list(self.places(name)) for name in reach}
-        if any(self.every.values()):
+        statics = world.transforms.static.values()
+        changes = {s.came for samples in statics for s in samples[1:] if max(s.off(samples[0])) > 1e-6}
+        self.moments = [*sorted(came - 1 for came in changes), EVER]  # a static frame has another place at each
+        self.every = {name: [list(self.places(name, moment)) for moment in self.moments] for name in reach}
+        if any(any(some) for some in self.every.values()):
             (self.follow_clouds if world.clouds else self.follow)()
 
-    def places(self, name):
+    def know(self, moment):
+        """What anybody ever knew, but of static frames what was known then."""
+        self.world.transforms.judge(moment, EVER - moment, EVER)
+
+    def back(self, m, stamp):
+        """From the fixed frame into the map's, or None."""
+        poses = []
+        for moment in self.moments:
+            self.know(moment)
+            poses.append(self.world.transforms.pose(m.frame or self.world.fixed, self.world.fixed, stamp(m)))
+        if poses[-1] is not None and any((p != poses[-1]).any() for p in poses):
+            raise NotCovered('own voxels of a map whose static frame was sent elsewhere')
+        return None if poses[-1] is None else np.linalg.inv(poses[-1])
+
+    def places(self, name, moment):
         """A body at all times at which tf has a place for it: stamp, vertices, surface."""
+        self.know(moment)
         track, w = self.world.tracks[name], self.world
         frames = [(f.stamp, f.frame, f.positions, f.surface) for f in getattr(track, 'every', [])]
         if isinstance(track, placed.Rigid):
@@ -97,13 +115,15 @@ class Owned:
 
     def ways(self, name, begin, end):
         """Straight ways between places: the vertices at both ends, the surface. A static body is where each frame has it at all times."""
-        every, times = self.every[name], [stamp for stamp, _, _ in self.every[name]]
-        if not self.world.tracks[name].moves:
-            return [(points, points, surface) for _, points, surface in every]
-        first, last = np.searchsorted(times, begin, 'right') - 1, np.searchsorted(times, end, 'left') + 1
-        some = every[max(0, first):last]
-        joined = [(p, q, surface) for (_, p, _), (_, q, surface) in zip(some, some[1:]) if p.shape == q.shape]
-        return joined + [(points, points, surface) for _, points, surface in some]
+        found = []
+        for every in self.every[name]:
+            times = [stamp for stamp, _, _ in every]
+            first, last = np.searchsorted(times, begin, 'right') - 1, np.searchsorted(times, end, 'left') + 1
+            moves = self.world.tracks[name].moves
+            some = every[max(0, first):last] if moves else every
+            found += [(p, q, surface) for (_, p, _), (_, q, surface) in zip(some, some[1:]) if moves and p.shape == q.shape]
+            found += [(points, points, surface) for _, points, surface in some]
+        return found
 
     def reached(self, name, numbers, ways, back, reach, resolution, sure=False):
         """Which voxels come within reach; `sure`: only those that the monitor certainly finds."""
@@ -132,7 +152,7 @@ class Owned:
 
     def follow(self):
         w, before, own, doubt, remembered, missed = self.world, None, NONE, NONE, NONE, False
-        ends = np.concatenate([points for places in self.every.values() for _, points, _ in places])
+        ends = np.concatenate([points for some in self.every.values() for places in some for _, points, _ in places])
         box = np.stack(np.meshgrid(*zip(np.nanmin(ends, 0), np.nanmax(ends, 0))), -1).reshape(-1, 3)
         for m in w.maps:
             if m.problem:
@@ -142,8 +162,7 @@ class Owned:
                 raise NotCovered('maps whose stamps go back, and own voxels')
             if before is not None and (m.frame, m.resolution) != (before.frame, before.resolution):
                 before, own, doubt, remembered = None, NONE, NONE, NONE
-            pose = w.transforms.pose(m.frame or w.fixed, w.fixed, w.placed_at(m))
-            back = None if pose is None else np.linalg.inv(pose)
+            back = self.back(m, w.placed_at)
             reach = {name: m.resolution if r == 'auto' else r for name, r in self.reach.items()}
             more, corners = max(reach.values()) + 2 * m.resolution, placed.carried(back, box)
             low, high = (np.floor(x / m.resolution).astype(int) + 32768 for x in (corners.min(0) - more, corners.max(0) + more))
@@ -163,7 +182,8 @@ class Owned:
                     own = np.union1d(own, near)
                 else:
                     doubt = np.union1d(doubt, near)
-                lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
+                if len(self.moments) == 1:  # else nobody is certain of where it was
+                    lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
             if missed and not self.trust:
                 own, doubt = NONE, np.union1d(own, doubt)
             self.of[m.number] = own, doubt
@@ -173,8 +193,7 @@ class Owned:
         """What no body ever reached until then is none's own, however often it was seen free before."""
         seen, ever, begin = NONE, np.zeros(0, bool), 0
         for m in self.world.maps:
-            pose = self.world.transforms.pose(m.frame, self.world.fixed, m.stamp)
-            back = None if pose is None else np.linalg.inv(pose)
+            back = self.back(m, lambda cloud: cloud.stamp)
             fresh = np.setdiff1d(packed(m.corners), seen)
             asked = [(np.concatenate([seen, fresh]), begin - self.lag), (fresh, 0)]
             ever = np.append(ever, np.zeros(len(fresh), bool))
