@@ -136,13 +136,12 @@ def viewpoint(message, points):
     return places if len(places) else None
 
 
-def turned(q, points):
-    """The points, turned by the quaternion x, y, z, w."""
+def rotation(q):
+    """The matrix of the quaternion x, y, z, w."""
     x, y, z, w = np.asarray(q, float) / np.linalg.norm(q)
-    m = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                  [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                  [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-    return points @ m.T
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
 class Reader:
@@ -211,9 +210,7 @@ class Reader:
         points = np.array([(p.x, p.y, p.z) for p in m.vertices], float).reshape(-1, 3)
         return (points,) + self.indexed([t.vertex_indices for t in m.triangles], points)
 
-    def Mesh(self, m):
-        points = np.array([(p.x, p.y, p.z) for p in m.vertices], float).reshape(-1, 3)
-        return (points,) + self.indexed([t.vertex_indices for t in m.triangles], points)
+    Mesh = MeshStamped
 
     def PolygonMesh(self, m):
         points = cloud_points(m.cloud)
@@ -276,7 +273,7 @@ class Reader:
         q, t = m.pose.orientation, m.pose.position
         quaternion = (q.x, q.y, q.z, q.w)
         if any(quaternion) and quaternion != (0, 0, 0, 1):
-            points = turned(quaternion, points)
+            points = points @ rotation(quaternion).T
         return points + (t.x, t.y, t.z) if (t.x, t.y, t.z) != (0, 0, 0) else points
 
     def PoseArray(self, m):
@@ -427,7 +424,7 @@ def links(path, files):
                 r, p, y = [a / 2 for a in numbers('rpy', of=origin)]
                 (cr, cp, cy), (sr, sp, sy) = np.cos([r, p, y]), np.sin([r, p, y])
                 q = (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
-                points = turned(q, points) + numbers('xyz', of=origin)
+                points = points @ rotation(q).T + numbers('xyz', of=origin)
             yield link.get('name'), points, surface, lost
 
 
@@ -450,10 +447,6 @@ class Map:
     problem: str = ''  # why it cannot be read
     rays: tuple = ((), ())  # of a cloud, where its sensor was, and the points
     free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
-
-    @property
-    def leaves(self):
-        return self.corners, self.sizes
 
     def boxes(self):
         keys = self.corners.astype(float) - 32768

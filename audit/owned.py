@@ -39,9 +39,8 @@ def voxels(corners, sizes, low, high):
     return np.concatenate(found)
 
 
-def shown(leaves, numbers):
+def shown(corners, sizes, numbers):
     """Which of the voxels lie in one of the leaves."""
-    corners, sizes = leaves
     found, keys = np.zeros(len(numbers), bool), unpacked(numbers)
     for size in np.unique(sizes):
         found |= np.isin(packed(keys // size * size), packed(corners[sizes == size]))
@@ -52,7 +51,7 @@ def less(map_, numbers):
     """The map without these voxels."""
     if not len(numbers):
         return map_
-    corners, sizes = map_.leaves
+    corners, sizes = map_.corners, map_.sizes
     hit = np.zeros(len(sizes), bool)
     for size in np.unique(sizes):
         mine = sizes == size
@@ -66,7 +65,7 @@ def with_unknown(map_, box):
     """The map, in which each voxel wholly within the box of which it tells nothing is an obstacle."""
     low, high = (np.array(box[i:i + 3]) / map_.resolution + 32768 for i in (0, 3))
     every = voxels(np.zeros((1, 3), int), np.array([65536]), np.ceil(low - 1e-6).astype(int), np.floor(high + 1e-6).astype(int))
-    unknown = unpacked(every[~shown(map_.leaves, every) & ~shown(map_.free, every)])
+    unknown = unpacked(every[~shown(map_.corners, map_.sizes, every) & ~shown(*map_.free, every)])
     return replace(map_, corners=np.concatenate([map_.corners, unknown]), sizes=np.append(map_.sizes, np.ones(len(unknown), int)))
 
 
@@ -101,12 +100,12 @@ class Owned:
         """A body at all times at which tf has a place for it: stamp, vertices, surface."""
         self.know(moment)
         track, w = self.world.tracks[name], self.world
-        frames = [(f.stamp, f.frame, f.positions, f.surface) for f in getattr(track, 'every', [])]
+        frames = [(f.stamp, f.frame, f.positions, f.surface) for f in track.every]
         if isinstance(track, placed.Rigid):
             # A step takes it where tf has it at the clock's frames, and looks at tf's samples in between.
             stamps = {f.stamp for f in getattr(w.tracks.get(w.clock_body), 'every', [])}
             stamps |= {sample.stamp for samples in w.transforms.samples.values() for sample in samples}
-            frames = [(stamp, track.frame, track.positions, track.mesh) for stamp in stamps]
+            frames = [(stamp, track.mesh.frame, track.mesh.positions, track.mesh.surface) for stamp in stamps]
         for stamp, frame, points, surface in sorted(frames, key=lambda f: f[0]):
             try:
                 yield stamp, placed.carried(w.transforms.pose(frame, w.fixed, stamp), points), surface
@@ -166,14 +165,14 @@ class Owned:
             reach = {name: m.resolution if r == 'auto' else r for name, r in self.reach.items()}
             more, corners = max(reach.values()) + 2 * m.resolution, placed.carried(back, box)
             low, high = (np.floor(x / m.resolution).astype(int) + 32768 for x in (corners.min(0) - more, corners.max(0) + more))
-            fresh, gone = voxels(*m.leaves, low, high), remembered
+            fresh, gone = voxels(m.corners, m.sizes, low, high), remembered
             if before is not None:
-                vanished = voxels(*before.leaves, low, high)
+                vanished = voxels(before.corners, before.sizes, low, high)
                 gone = np.concatenate([gone, vanished[~np.isin(vanished, np.concatenate([own, doubt]))]])
-                fresh = fresh[~shown(before.leaves, fresh)]
-            fresh, gone = fresh[~np.isin(fresh, remembered)], gone[~shown(m.leaves, gone)]
-            lasts = ~shown(m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
-            own, doubt = own[shown(m.leaves, own)], doubt[shown(m.leaves, doubt)]
+                fresh = fresh[~shown(before.corners, before.sizes, fresh)]
+            fresh, gone = fresh[~np.isin(fresh, remembered)], gone[~shown(m.corners, m.sizes, gone)]
+            lasts = ~shown(*m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
+            own, doubt = own[shown(m.corners, m.sizes, own)], doubt[shown(m.corners, m.sizes, doubt)]
             for name in self.every:
                 ways = self.ways(name, (m if before is None else before).stamp - self.lag, m.stamp)
                 near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from came import NotCovered
+from came import NotCovered, rotation
 
 NS = 1000000000
 
@@ -52,13 +52,9 @@ class Sample:
         return np.abs(self.translation - other.translation).max(), turn
 
 
-def matrix(translation, rotation):
-    x, y, z, w = rotation / np.linalg.norm(rotation)
+def matrix(translation, quaternion):
     m = np.eye(4)
-    m[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                 [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                 [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
-    m[:3, 3] = translation
+    m[:3, :3], m[:3, 3] = rotation(quaternion), translation
     return m
 
 
@@ -197,23 +193,6 @@ class Transforms:
         return all((p == poses[0]).all() for p in poses)
 
 
-class Track:
-    """One body: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen of it."""
-    moves = True
-    memory = property(lambda self: self.transforms.memory)
-
-    def turns(self, start, end):
-        return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
-
-    def loose(self, start, end):
-        """May the monitor take another path for its, within rigid_tolerance_m?"""
-        return bool(self.knots(start, end)) or self.turns(start, end)
-
-    def loose_at_end(self, start, end):
-        """The same of the place at the end."""
-        return False
-
-
 def halves(stamps):
     """With those in the middle: joints that turn against each other are elsewhere there."""
     return sorted(stamps + [(a + b) // 2 for a, b in zip(stamps, stamps[1:])])
@@ -223,8 +202,10 @@ def carried(pose, points):
     return points if pose is None else points @ pose[:3, :3].T + pose[:3, 3]
 
 
-class Stream(Track):
-    """A body whose frames came as messages."""
+class Stream:
+    """A body whose frames came as messages: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen."""
+    moves = True
+    memory = property(lambda self: self.transforms.memory)
 
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
         self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
@@ -286,11 +267,10 @@ class Stream(Track):
     @once
     def at(self, stamp, start, end):
         frames = self.around(start, end)
-        i = bisect.bisect_left([f.stamp for f in frames], stamp)
-        b = frames[i]
+        i = min(len(frames) - 1, bisect.bisect_left([f.stamp for f in frames], stamp))
+        a, b = frames[max(0, i - 1)], frames[i]
         points = b.positions
-        if b.stamp != stamp:
-            a = frames[i - 1]
+        if a is not b and b.stamp != stamp:
             points = a.positions + (stamp - a.stamp) / (b.stamp - a.stamp) * (b.positions - a.positions)
         return carried(self.transforms.pose(b.frame, self.fixed, stamp), points)
 
@@ -299,11 +279,36 @@ class Stream(Track):
         frames = self.around(start, end)
         return frames[0].stamp == start and frames[-1].stamp == end and len(frames) == 2 and frames[0].frame == self.fixed
 
+    def turns(self, start, end):
+        return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
+
+    def loose(self, start, end):
+        """May the monitor take another path for its, within rigid_tolerance_m?"""
+        return bool(self.knots(start, end)) or self.turns(start, end)
+
     def loose_at_end(self, start, end):
+        """The same of the place at the end."""
         return self.around(start, end)[-1].stamp != end and self.turns(start, end)
 
     def carrier(self, start, end):
         return self.around(start, end)[0].frame
+
+
+class Rigid(Stream):
+    """A mesh that a tf frame carries."""
+
+    def __init__(self, name, frame, transforms, fixed):
+        super().__init__(name, [], [], transforms, fixed, 0)
+        self.mesh = frame
+
+    def around(self, start, end):
+        return [self.mesh]
+
+    def exact(self, start, end):
+        return self.mesh.frame == self.fixed
+
+    def loose_at_end(self, start, end):
+        return False
 
 
 class Held(Stream):
@@ -352,34 +357,6 @@ class Held(Stream):
 
     def loose(self, start, end):
         return self.carrier(start, end) != self.fixed
-
-
-class Rigid(Track):
-    """A mesh that a tf frame carries."""
-
-    def __init__(self, name, positions, surface, lost, frame, transforms, fixed):
-        self.name, self.positions, self.mesh, self.lost = name, positions, surface, lost
-        self.frame, self.transforms, self.fixed = frame, transforms, fixed
-
-    def surface(self, start, end):
-        return self.mesh
-
-    def unchecked(self, start, end, mask):
-        return self.lost
-
-    @once
-    def knots(self, start, end):
-        return self.transforms.knots(self.frame, self.fixed, start, end)
-
-    @once
-    def at(self, stamp, start, end):
-        return carried(self.transforms.pose(self.frame, self.fixed, stamp), self.positions)
-
-    def exact(self, start, end):
-        return self.frame == self.fixed
-
-    def carrier(self, start, end):
-        return self.frame
 
 
 def pieces(tracks, start, end, tolerance):
