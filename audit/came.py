@@ -228,13 +228,14 @@ class Reader:
         return self.made[1], self.made[2]
 
     def Marker(self, m):
-        class One:
-            markers = [m]
-        return self.MarkerArray(One)
+        return self.markers([m])
 
     def MarkerArray(self, m):
+        return self.markers(m.markers)
+
+    def markers(self, given):
         marker = self.settings.get('marker', {})
-        mine = [x for x in m.markers if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
+        mine = [x for x in given if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
                 and marker.get('namespace', x.ns) == x.ns and marker.get('id', x.id) == x.id]
         soup = [x for x in mine if x.type == 11]
         if not soup:
@@ -530,10 +531,3 @@ def filled(points, sensor, settings, most_off=1e-4):
     keys = np.floor(points / edge)
     inside = np.abs(points / edge - keys - 0.5).max(1, initial=0) < 0.5 - most_off
     return np.unique(keys[inside].astype(int) + 32768, axis=0).reshape(-1, 3)
-
-
-def octomap_message(message, came, number):
-    found = octomap(message.data, message.binary, message.id, message.resolution)
-    found.stamp = message.header.stamp.to_nsec() or came
-    found.frame, found.came, found.number = message.header.frame_id.lstrip('/'), came, number
-    return found

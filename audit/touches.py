@@ -73,21 +73,19 @@ def square_free(p):
     return divided(p, common(p, d))[0] if d else p
 
 
-class Sturm:
-    """Counts the distinct roots of a polynomial without double roots in (low, high]."""
+def sturm(p):
+    """The chain of a polynomial without double roots."""
+    chain = [p, derivative(p)]
+    while chain[-1]:
+        chain.append([-c for c in divided(chain[-2], chain[-1])[1]])
+    return chain[:-1]
 
-    def __init__(self, p):
-        self.chain = [p, derivative(p)]
-        while self.chain[-1]:
-            self.chain.append([-c for c in divided(self.chain[-2], self.chain[-1])[1]])
-        self.chain.pop()
 
-    def changes(self, t):
-        signs = [s for s in (sign(at(p, t)) for p in self.chain) if s]
-        return sum(a != b for a, b in zip(signs, signs[1:]))
-
-    def count(self, low, high):
-        return self.changes(low) - self.changes(high)
+def count(chain, low, high):
+    """How many distinct roots there are in (low, high]."""
+    signs = [[s for s in (sign(at(p, t)) for p in chain) if s] for t in (low, high)]
+    before, after = (sum(a != b for a, b in zip(s, s[1:])) for s in signs)
+    return before - after
 
 
 class Root:
@@ -113,10 +111,10 @@ class Root:
             value = at(q, self.high)
             if abs(value) > (self.high - self.low) * sum(i * abs(c) for i, c in enumerate(q)) or self.low == self.high:
                 return sign(value)  # between low and high it changes by less
-        if not q or Sturm(common(self.p, q)).count(self.low, self.high) > 0:
+        if not q or count(sturm(common(self.p, q)), self.low, self.high) > 0:
             return 0
-        counter = Sturm(square_free(q))
-        while self.low != self.high and (at(q, self.low) == 0 or counter.count(self.low, self.high) > 0):
+        chain = sturm(square_free(q))
+        while self.low != self.high and (at(q, self.low) == 0 or count(chain, self.low, self.high) > 0):
             self.halve()
         return sign(at(q, self.high))
 
@@ -127,19 +125,15 @@ def roots(p):
     if len(p) < 2:
         return []
     found = [Root(p, Fraction(0), Fraction(0))] if p[0] == 0 else []
-    counter = Sturm(p)
-    open_intervals = [(Fraction(0), Fraction(1))]
-    inner = []
-    while open_intervals:
-        low, high = open_intervals.pop()
-        count = counter.count(low, high)
-        if count == 1 and at(p, high) == 0:
-            inner.append(Root(p, high, high))
-        elif count == 1 and at(p, low) != 0:
-            inner.append(Root(p, low, high))
-        elif count > 0:
+    chain, left, inner = sturm(p), [(Fraction(0), Fraction(1))], []
+    while left:
+        low, high = left.pop()
+        many = count(chain, low, high)
+        if many == 1 and (at(p, high) == 0 or at(p, low) != 0):
+            inner.append(Root(p, high if at(p, high) == 0 else low, high))
+        elif many > 0:
             middle = (low + high) / 2
-            open_intervals += [(low, middle), (middle, high)]
+            left += [(low, middle), (middle, high)]
     return found + sorted(inner, key=lambda root: root.high)
 
 
