@@ -471,6 +471,15 @@ def own_voxels_beside_a_static_frame_that_is_sent_elsewhere(c):
     c.map([(9, 9, 9), (0, 0, 0), (6, 0, 0)], .15)
 
 
+def a_transform_that_comes_again_elsewhere_before_the_answer(c):
+    """The end of a step at 0.5 s lies between two samples; the later one comes again elsewhere, then the frame that the answer waits for."""
+    c.body('sheet', SHEET, 3, every(.1))
+    c.body('object', SMALL, 2, every(.1, 1.03, -.07), z=lambda t: .3, delay=.06)
+    c.tf('finger', every(.02, 1.11, -.11), z=lambda t: .3)
+    c.tf('finger', [.51], z=lambda t: -.3, delay=.03)
+    c.finger('finger')
+
+
 CASES = {name: make for name, make in list(globals().items()) if callable(make) and getattr(make, '__code__', None)
          and make.__code__.co_varnames[:1] == ('c',) and make.__code__.co_argcount == 1}
 

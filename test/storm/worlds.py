@@ -91,7 +91,7 @@ class World:
             self.map()
         self.options()
         self.camera(random.Random(-seed))  # of its own, so that worlds without a camera stay what they were
-        self.of_itself(random.Random(seed + NS))
+        self.rarely(random.Random(seed + NS))
         self.rows.sort(key=lambda row: row[2])
         self.faults = []
         if not self.tame:
@@ -240,10 +240,28 @@ class World:
                     row[1].header.frame_id = 'world'
                     seen_from(row[1], (.02, 0, 0))
 
-    def of_itself(self, r):
-        """How far bodies are from themselves."""
-        if not self.tame and 'effects' in self.params and r.random() < .5:
-            self.params['clearance'] = {'self_m': r.choice([.15, .3])}
+    def rarely(self, r):
+        """What few are told: distances of a body from itself, noise, pairs with a separation of their own, shells, phases."""
+        p, names = self.params, list(self.params['bodies'])
+        if self.tame:
+            return
+        if 'effects' in p and r.random() < .5:
+            p['clearance'] = {'self_m': r.choice([.15, .3])}
+        one = p['bodies'][r.choice(names)]
+        if 'accuracy' in p and r.random() < .5:
+            one['uncertainty'] = {'radius_m': r.choice([.001, .005])}
+            one['self_collision'] = False
+        if 'accuracy' in p and r.random() < .3 and len(names) > 1:
+            p['minimum_separation_pairs'] = [{'between': r.sample(names, 2), 'separation_m': r.choice([0, .004, .02])}]
+        if r.random() < .2:
+            p['bodies'][r.choice(names)][r.choice(['shell', 'against_bodies'])] = r.random() < .5
+        if r.random() < .2:
+            name = r.choice(names)
+            row = {'between': [name, r.choice([n for n in names if n != name] + ['octomap'])], 'phase': r.choice(['lay', 'carry'])}
+            if r.random() < .5:
+                row['vertices'] = {name: [0, 1, 2, 3]}
+            p.setdefault('expected_contacts', []).append(row)
+            p['phase'] = r.choice([row['phase'], ''])
 
     def options(self):
         r, p = self.r, self.params
