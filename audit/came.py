@@ -56,7 +56,8 @@ class Frame:
     frame: str
     positions: np.ndarray
     surface: Surface = None
-    unchecked: int = 0
+    unseen: np.ndarray = None  # of each vertex: it is not finite, or of no edge
+    unchecked: int = 0         # faces that could not be used
     came: int = 0    # [ns] when the bag has it
     number: int = 0  # place among all messages
 
@@ -104,14 +105,14 @@ def welded(corners):
 # -- messages -----------------------------------------------------------------------------------------------------------
 
 
-def cloud_points(message):
+def cloud_points(message, names='xyz'):
     fields = {f.name: f for f in message.fields}
     n, order = message.height * message.width, '>' if message.is_bigendian else '<'
     row = message.row_step if message.height > 1 else message.width * message.point_step
     if message.height > 1 and len(message.data) == n * message.point_step:
         row = message.width * message.point_step
     columns = []
-    for name in 'xyz':
+    for name in names:
         if name not in fields or fields[name].datatype not in (7, 8):
             raise Refused('no field %s of floats' % name)
         kind = np.dtype(order + ('f4' if fields[name].datatype == 7 else 'f8'))
@@ -123,13 +124,24 @@ def cloud_points(message):
     return np.stack(columns, 1)
 
 
-def turned(q, points):
-    """The points, turned by the quaternion x, y, z, w."""
+def viewpoint(message, points):
+    """Where the points of a cloud were seen from, in its frame: one place, or None."""
+    names = 'vp_x', 'vp_y', 'vp_z'
+    if not {f.name for f in message.fields}.issuperset(names):
+        return None
+    places = cloud_points(message, names)
+    places = np.unique(places[np.isfinite(places).all(1) & np.isfinite(points).all(1)], axis=0)
+    if len(places) > 1:
+        raise Refused('its points were seen from different places')
+    return places if len(places) else None
+
+
+def rotation(q):
+    """The matrix of the quaternion x, y, z, w."""
     x, y, z, w = np.asarray(q, float) / np.linalg.norm(q)
-    m = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                  [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                  [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-    return points @ m.T
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
 class Reader:
@@ -156,10 +168,8 @@ class Reader:
         if self.known is not None and surface is not self.known and surface.same_as(self.known):
             surface = self.known
         self.known = surface
-        lost = ~np.isfinite(positions).all(1)
-        bare = np.ones(len(positions), bool)
-        bare[surface.used] = False
-        return Frame(stamp, name, positions, surface, unchecked + int((lost | bare).sum()), came, number)
+        unseen = ~np.isfinite(positions).all(1) | ~np.isin(np.arange(len(positions)), surface.used)
+        return Frame(stamp, name, positions, surface, unseen, unchecked, came, number)
 
     def topology(self):
         said = self.settings.get('topology', {})
@@ -200,9 +210,7 @@ class Reader:
         points = np.array([(p.x, p.y, p.z) for p in m.vertices], float).reshape(-1, 3)
         return (points,) + self.indexed([t.vertex_indices for t in m.triangles], points)
 
-    def Mesh(self, m):
-        points = np.array([(p.x, p.y, p.z) for p in m.vertices], float).reshape(-1, 3)
-        return (points,) + self.indexed([t.vertex_indices for t in m.triangles], points)
+    Mesh = MeshStamped
 
     def PolygonMesh(self, m):
         points = cloud_points(m.cloud)
@@ -220,13 +228,14 @@ class Reader:
         return self.made[1], self.made[2]
 
     def Marker(self, m):
-        class One:
-            markers = [m]
-        return self.MarkerArray(One)
+        return self.markers([m])
 
     def MarkerArray(self, m):
+        return self.markers(m.markers)
+
+    def markers(self, given):
         marker = self.settings.get('marker', {})
-        mine = [x for x in m.markers if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
+        mine = [x for x in given if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
                 and marker.get('namespace', x.ns) == x.ns and marker.get('id', x.id) == x.id]
         soup = [x for x in mine if x.type == 11]
         if not soup:
@@ -236,16 +245,13 @@ class Reader:
         corners = self.placed(soup[0], True)
         if len(corners) % 3:
             raise Refused('no whole number of triangles')
-        if self.settings.get('weld', 'on') in ('off', False):
-            index = np.arange(len(corners))
-        else:
-            if self.weld is None or len(self.weld) != len(corners):
-                self.weld = welded(corners)[1]
-            first = np.unique(self.weld, return_index=True)[1]
-            if not (corners[first][self.weld] == corners).all():
-                raise NotCovered('welded corners that come apart')
-            index, corners = self.weld, corners[first]
-        faces, lost = fans(index.reshape(-1, 3).tolist(), corners)
+        if self.weld is None or len(self.weld) != len(corners):
+            self.weld = welded(corners)[1]
+        first = np.unique(self.weld, return_index=True)[1]
+        if not (corners[first][self.weld] == corners).all():
+            raise NotCovered('welded corners that come apart')
+        corners = corners[first]
+        faces, lost = fans(self.weld.reshape(-1, 3).tolist(), corners)
         return corners, self.reuse(('soup', faces.tobytes()), lambda: Surface(len(corners), faces)), lost
 
     def ropes(self, markers):
@@ -268,7 +274,7 @@ class Reader:
         q, t = m.pose.orientation, m.pose.position
         quaternion = (q.x, q.y, q.z, q.w)
         if any(quaternion) and quaternion != (0, 0, 0, 1):
-            points = turned(quaternion, points)
+            points = points @ rotation(quaternion).T
         return points + (t.x, t.y, t.z) if (t.x, t.y, t.z) != (0, 0, 0) else points
 
     def PoseArray(self, m):
@@ -384,13 +390,12 @@ def read_ply(path):
 
 
 def links(path, files):
-    """Each collision element of a URDF: link, positions, surface, lost, and how far its round parts lie within the true ones."""
+    """Each collision element of a URDF: link, positions, surface, lost. Of what is round a mesh that lies within it."""
     tree = xml.parse(path).getroot()
     for link in tree.findall('link'):
         for element in link.findall('collision'):
             shape = element.find('geometry')[0]
             numbers = lambda name, default='0 0 0', of=shape: [float(w) for w in of.get(name, default).split()]
-            rough = 0.0
             if shape.tag == 'box':
                 points, lost = np.array([[x, y, z] for z in (-.5, .5) for y in (-.5, .5) for x in (-.5, .5)]) * numbers('size'), 0
                 faces = [f for a, b, c, d in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -409,7 +414,7 @@ def links(path, files):
                     a, b, c, d = 32 * k + i, 32 * k + (i + 1) % 32, 32 * k + 32 + i, 32 * k + 32 + (i + 1) % 32
                     faces += [np.stack([a, b, c], 1), np.stack([b, d, c], 1)]
                 faces += [np.stack([0 * i + top, (i + 1) % 32, i], 1), np.stack([0 * i + top + 1, top - 32 + i, top - 32 + (i + 1) % 32], 1)]
-                surface, rough = Surface(len(points), np.concatenate(faces)), radius * 0.0049
+                surface = Surface(len(points), np.concatenate(faces))
             elif shape.tag == 'mesh':
                 points, surface, lost = files.mesh(shape.get('filename'))
                 points = points * numbers('scale', '1 1 1')
@@ -420,8 +425,8 @@ def links(path, files):
                 r, p, y = [a / 2 for a in numbers('rpy', of=origin)]
                 (cr, cp, cy), (sr, sp, sy) = np.cos([r, p, y]), np.sin([r, p, y])
                 q = (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
-                points = turned(q, points) + numbers('xyz', of=origin)
-            yield link.get('name'), points, surface, lost, rough
+                points = points @ rotation(q).T + numbers('xyz', of=origin)
+            yield link.get('name'), points, surface, lost
 
 
 # -- octomaps -----------------------------------------------------------------------------------------------------------
@@ -441,11 +446,8 @@ class Map:
     came: int = 0
     number: int = 0
     problem: str = ''  # why it cannot be read
+    rays: tuple = ((), ())  # of a cloud, where its sensor was, and the points
     free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
-
-    @property
-    def leaves(self):
-        return self.corners, self.sizes
 
     def boxes(self):
         keys = self.corners.astype(float) - 32768
@@ -529,10 +531,3 @@ def filled(points, sensor, settings, most_off=1e-4):
     keys = np.floor(points / edge)
     inside = np.abs(points / edge - keys - 0.5).max(1, initial=0) < 0.5 - most_off
     return np.unique(keys[inside].astype(int) + 32768, axis=0).reshape(-1, 3)
-
-
-def octomap_message(message, came, number):
-    found = octomap(message.data, message.binary, message.id, message.resolution)
-    found.stamp = message.header.stamp.to_nsec() or came
-    found.frame, found.came, found.number = message.header.frame_id.lstrip('/'), came, number
-    return found

@@ -13,7 +13,7 @@ from came import NotCovered
 from placed import NS, Unknown
 
 MOST_VOXELS = 4000000
-NONE = np.empty(0, np.int64)
+NONE, EVER = np.empty(0, np.int64), 1 << 62
 
 
 def packed(keys):
@@ -39,9 +39,8 @@ def voxels(corners, sizes, low, high):
     return np.concatenate(found)
 
 
-def shown(leaves, numbers):
+def shown(corners, sizes, numbers):
     """Which of the voxels lie in one of the leaves."""
-    corners, sizes = leaves
     found, keys = np.zeros(len(numbers), bool), unpacked(numbers)
     for size in np.unique(sizes):
         found |= np.isin(packed(keys // size * size), packed(corners[sizes == size]))
@@ -52,7 +51,7 @@ def less(map_, numbers):
     """The map without these voxels."""
     if not len(numbers):
         return map_
-    corners, sizes = map_.leaves
+    corners, sizes = map_.corners, map_.sizes
     hit = np.zeros(len(sizes), bool)
     for size in np.unique(sizes):
         mine = sizes == size
@@ -66,7 +65,7 @@ def with_unknown(map_, box):
     """The map, in which each voxel wholly within the box of which it tells nothing is an obstacle."""
     low, high = (np.array(box[i:i + 3]) / map_.resolution + 32768 for i in (0, 3))
     every = voxels(np.zeros((1, 3), int), np.array([65536]), np.ceil(low - 1e-6).astype(int), np.floor(high + 1e-6).astype(int))
-    unknown = unpacked(every[~shown(map_.leaves, every) & ~shown(map_.free, every)])
+    unknown = unpacked(every[~shown(map_.corners, map_.sizes, every) & ~shown(*map_.free, every)])
     return replace(map_, corners=np.concatenate([map_.corners, unknown]), sizes=np.append(map_.sizes, np.ones(len(unknown), int)))
 
 
@@ -76,19 +75,37 @@ class Owned:
     def __init__(self, world, reach, lag, trust):
         self.world, self.reach, self.lag, self.trust = world, reach, int(lag * NS), trust
         self.of = {}  # by the map's number: what may be own, what may be in doubt
-        self.every = {name: list(self.places(name)) for name in reach}
-        if any(self.every.values()):
+        statics = world.transforms.static.values()
+        changes = {s.came for samples in statics for s in samples[1:] if max(s.off(samples[0])) > 1e-6}
+        self.moments = [*sorted(came - 1 for came in changes), EVER]  # a static frame has another place at each
+        self.every = {name: [list(self.places(name, moment)) for moment in self.moments] for name in reach}
+        if any(any(some) for some in self.every.values()):
             (self.follow_clouds if world.clouds else self.follow)()
 
-    def places(self, name):
+    def know(self, moment):
+        """What anybody ever knew, but of static frames what was known then."""
+        self.world.transforms.judge(moment, EVER - moment, EVER)
+
+    def back(self, m, stamp):
+        """From the fixed frame into the map's, or None."""
+        poses = []
+        for moment in self.moments:
+            self.know(moment)
+            poses.append(self.world.transforms.pose(m.frame or self.world.fixed, self.world.fixed, stamp(m)))
+        if poses[-1] is not None and any((p != poses[-1]).any() for p in poses):
+            raise NotCovered('own voxels of a map whose static frame was sent elsewhere')
+        return None if poses[-1] is None else np.linalg.inv(poses[-1])
+
+    def places(self, name, moment):
         """A body at all times at which tf has a place for it: stamp, vertices, surface."""
+        self.know(moment)
         track, w = self.world.tracks[name], self.world
-        frames = [(f.stamp, f.frame, f.positions, f.surface) for f in getattr(track, 'every', [])]
+        frames = [(f.stamp, f.frame, f.positions, f.surface) for f in track.every]
         if isinstance(track, placed.Rigid):
             # A step takes it where tf has it at the clock's frames, and looks at tf's samples in between.
             stamps = {f.stamp for f in getattr(w.tracks.get(w.clock_body), 'every', [])}
             stamps |= {sample.stamp for samples in w.transforms.samples.values() for sample in samples}
-            frames = [(stamp, track.frame, track.positions, track.mesh) for stamp in stamps]
+            frames = [(stamp, track.mesh.frame, track.mesh.positions, track.mesh.surface) for stamp in stamps]
         for stamp, frame, points, surface in sorted(frames, key=lambda f: f[0]):
             try:
                 yield stamp, placed.carried(w.transforms.pose(frame, w.fixed, stamp), points), surface
@@ -97,13 +114,15 @@ class Owned:
 
     def ways(self, name, begin, end):
         """Straight ways between places: the vertices at both ends, the surface. A static body is where each frame has it at all times."""
-        every, times = self.every[name], [stamp for stamp, _, _ in self.every[name]]
-        if not self.world.tracks[name].moves:
-            return [(points, points, surface) for _, points, surface in every]
-        first, last = np.searchsorted(times, begin, 'right') - 1, np.searchsorted(times, end, 'left') + 1
-        some = every[max(0, first):last]
-        joined = [(p, q, surface) for (_, p, _), (_, q, surface) in zip(some, some[1:]) if p.shape == q.shape]
-        return joined + [(points, points, surface) for _, points, surface in some]
+        found = []
+        for every in self.every[name]:
+            times = [stamp for stamp, _, _ in every]
+            first, last = np.searchsorted(times, begin, 'right') - 1, np.searchsorted(times, end, 'left') + 1
+            moves = self.world.tracks[name].moves
+            some = every[max(0, first):last] if moves else every
+            found += [(p, q, surface) for (_, p, _), (_, q, surface) in zip(some, some[1:]) if moves and p.shape == q.shape]
+            found += [(points, points, surface) for _, points, surface in some]
+        return found
 
     def reached(self, name, numbers, ways, back, reach, resolution, sure=False):
         """Which voxels come within reach; `sure`: only those that the monitor certainly finds."""
@@ -114,25 +133,25 @@ class Owned:
         for p, q, surface in ways:
             elements = surface.faces if len(surface.faces) else surface.edges[:, [0, 1, 1]]
             p, q = placed.carried(back, p), placed.carried(back, q)
-            far = np.nanmax(np.linalg.norm(q - p, axis=1), initial=0)
+            far = np.nanmax(touches.length(q - p), initial=0)
             many = 0 if far == 0 else 1 if sure else 1 + int(min(64, 4 * far / resolution))
             within = reach - resolution / 2 - tolerance if sure else reach + 0.8661 * resolution + far / max(1, many) + tolerance
-            for i in range(many + 1):
-                at = (p + (q - p) * (i / max(1, many)))[elements]
-                at = at[np.isfinite(at).all((1, 2))]
-                left = np.nonzero(~found)[0]
-                if not len(at) or not len(left):
-                    continue
-                which = touches.overlapping(middle[left] - within, middle[left] + within, at.min(1), at.max(1))
-                near = touches.point_to_face(middle[left[which[:, 0]]], at[which[:, 1]]) <= within
-                found[left[which[near, 0]]] = True
-                if solid and surface.closed:
-                    found[left] |= ((middle[left] >= at.min((0, 1))) & (middle[left] <= at.max((0, 1)))).all(1)
+            places = p[elements] + (q - p)[elements] * np.linspace(0, 1, many + 1)[:, None, None, None]
+            at = places[np.isfinite(places).all((2, 3))]
+            left = np.nonzero(~found)[0]
+            if not len(at) or not len(left):
+                continue
+            which = touches.overlapping(middle[left] - within, middle[left] + within, at.min(1), at.max(1))
+            near = touches.point_to_face(middle[left[which[:, 0]]], at[which[:, 1]]) <= within
+            found[left[which[near, 0]]] = True
+            if solid and surface.closed:
+                low, high = np.nanmin(places, (1, 2)), np.nanmax(places, (1, 2))
+                found[left] |= ((middle[left][:, None] >= low) & (middle[left][:, None] <= high)).all(2).any(1)
         return found
 
     def follow(self):
         w, before, own, doubt, remembered, missed = self.world, None, NONE, NONE, NONE, False
-        ends = np.concatenate([points for places in self.every.values() for _, points, _ in places])
+        ends = np.concatenate([points for some in self.every.values() for places in some for _, points, _ in places])
         box = np.stack(np.meshgrid(*zip(np.nanmin(ends, 0), np.nanmax(ends, 0))), -1).reshape(-1, 3)
         for m in w.maps:
             if m.problem:
@@ -142,19 +161,18 @@ class Owned:
                 raise NotCovered('maps whose stamps go back, and own voxels')
             if before is not None and (m.frame, m.resolution) != (before.frame, before.resolution):
                 before, own, doubt, remembered = None, NONE, NONE, NONE
-            pose = w.transforms.pose(m.frame or w.fixed, w.fixed, w.placed_at(m))
-            back = None if pose is None else np.linalg.inv(pose)
+            back = self.back(m, w.placed_at)
             reach = {name: m.resolution if r == 'auto' else r for name, r in self.reach.items()}
             more, corners = max(reach.values()) + 2 * m.resolution, placed.carried(back, box)
             low, high = (np.floor(x / m.resolution).astype(int) + 32768 for x in (corners.min(0) - more, corners.max(0) + more))
-            fresh, gone = voxels(*m.leaves, low, high), remembered
+            fresh, gone = voxels(m.corners, m.sizes, low, high), remembered
             if before is not None:
-                vanished = voxels(*before.leaves, low, high)
+                vanished = voxels(before.corners, before.sizes, low, high)
                 gone = np.concatenate([gone, vanished[~np.isin(vanished, np.concatenate([own, doubt]))]])
-                fresh = fresh[~shown(before.leaves, fresh)]
-            fresh, gone = fresh[~np.isin(fresh, remembered)], gone[~shown(m.leaves, gone)]
-            lasts = ~shown(m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
-            own, doubt = own[shown(m.leaves, own)], doubt[shown(m.leaves, doubt)]
+                fresh = fresh[~shown(before.corners, before.sizes, fresh)]
+            fresh, gone = fresh[~np.isin(fresh, remembered)], gone[~shown(m.corners, m.sizes, gone)]
+            lasts = ~shown(*m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
+            own, doubt = own[shown(m.corners, m.sizes, own)], doubt[shown(m.corners, m.sizes, doubt)]
             for name in self.every:
                 ways = self.ways(name, (m if before is None else before).stamp - self.lag, m.stamp)
                 near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]
@@ -163,7 +181,8 @@ class Owned:
                     own = np.union1d(own, near)
                 else:
                     doubt = np.union1d(doubt, near)
-                lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
+                if len(self.moments) == 1:  # else nobody is certain of where it was
+                    lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
             if missed and not self.trust:
                 own, doubt = NONE, np.union1d(own, doubt)
             self.of[m.number] = own, doubt
@@ -173,8 +192,7 @@ class Owned:
         """What no body ever reached until then is none's own, however often it was seen free before."""
         seen, ever, begin = NONE, np.zeros(0, bool), 0
         for m in self.world.maps:
-            pose = self.world.transforms.pose(m.frame, self.world.fixed, m.stamp)
-            back = None if pose is None else np.linalg.inv(pose)
+            back = self.back(m, lambda cloud: cloud.stamp)
             fresh = np.setdiff1d(packed(m.corners), seen)
             asked = [(np.concatenate([seen, fresh]), begin - self.lag), (fresh, 0)]
             ever = np.append(ever, np.zeros(len(fresh), bool))

@@ -9,13 +9,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from came import NotCovered
+from came import NotCovered, rotation
 
 NS = 1000000000
 
 
 class Unknown(Exception):
     """Nobody saw where it was; a claim that says so is refuted."""
+
+
+class NotSent(Unknown):
+    """No sample of it came for that time."""
+
+
+def once(question):
+    """Is asked once, as long as what is judged stays the same."""
+    def asked(self, *words):
+        key = self, question, words
+        if key not in self.memory:
+            self.memory[key] = question(self, *words)
+        return self.memory[key]
+    return asked
 
 
 @dataclass
@@ -38,13 +52,9 @@ class Sample:
         return np.abs(self.translation - other.translation).max(), turn
 
 
-def matrix(translation, rotation):
-    x, y, z, w = rotation / np.linalg.norm(rotation)
+def matrix(translation, quaternion):
     m = np.eye(4)
-    m[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                 [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                 [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
-    m[:3, 3] = translation
+    m[:3, :3], m[:3, 3] = rotation(quaternion), translation
     return m
 
 
@@ -82,7 +92,7 @@ class Transforms:
 
     def judge(self, said, ahead, begun):
         """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
-        self.said, self.read, self.begun, self.poses = said, said + ahead, begun, {}
+        self.said, self.read, self.begun, self.memory = said, said + ahead, begun, {}
 
     def have_statics_from_start(self):
         for samples in self.static.values():
@@ -91,6 +101,7 @@ class Transforms:
     def known(self, samples):
         return [s for s in samples if s.came <= (self.said if s.static else self.read)]
 
+    @once
     def around(self, child, stamp):
         """The two samples that a joint's place at a stamp rests on, or twice the one that it is."""
         fixed, moving = self.known(self.static.get(child, [])), self.samples.get(child, [])
@@ -112,7 +123,7 @@ class Transforms:
         while j < len(moving) and moving[j].came > self.read:
             j += 1
         if i < 0 or j == len(moving):
-            raise Unknown('no transform of %s at %.9f s' % (child, stamp / NS))
+            raise NotSent('no transform of %s at %.9f s' % (child, stamp / NS))
         i, j = (bisect.bisect_left(stamps, stamps[k]) for k in (i, j))  # of one stamp the first that came
         for k in (i, j):
             for other in moving[k:bisect.bisect_right(stamps, stamps[k])]:
@@ -122,6 +133,7 @@ class Transforms:
             raise Unknown('frame %s changes its parent at %.9f s' % (child, stamp / NS))
         return moving[i], moving[j]
 
+    @once
     def chain(self, frame, fixed, stamp):
         """Joints from `frame` up to where it meets the way of the fixed one, and those of the fixed one: (child, a, b)."""
         ways = []
@@ -139,22 +151,21 @@ class Transforms:
             raise Unknown('no transform from %s to %s' % (frame, fixed))
         return up[:names.index(meet)], down[:others.index(meet)]
 
+    @once
     def pose(self, frame, fixed, stamp):
         """4 x 4, or None where the frame is the fixed one."""
         if frame == fixed:
             return None
-        key = frame, fixed, stamp
-        if key not in self.poses:
-            ways = []
-            for way in self.chain(frame, fixed, stamp):
-                m = np.eye(4)
-                for _, a, b in way:
-                    share = (stamp - a.stamp) / (b.stamp - a.stamp) if a is not b and a.stamp != b.stamp else 0.0
-                    m = (between(a, b, share) if share else matrix(a.translation, a.rotation)) @ m
-                ways.append(m)
-            self.poses[key] = np.linalg.inv(ways[1]) @ ways[0]
-        return self.poses[key]
+        ways = []
+        for way in self.chain(frame, fixed, stamp):
+            m = np.eye(4)
+            for _, a, b in way:
+                share = (stamp - a.stamp) / (b.stamp - a.stamp) if a.stamp != b.stamp else 0.0
+                m = (between(a, b, share) if share else matrix(a.translation, a.rotation)) @ m
+            ways.append(m)
+        return np.linalg.inv(ways[1]) @ ways[0]
 
+    @once
     def knots(self, frame, fixed, start, end):
         """Stamps of the samples within the step; one that cannot be used, around it, is a place that nobody knows."""
         if frame == fixed:
@@ -173,28 +184,13 @@ class Transforms:
             found |= {s.stamp for s in within}
         return sorted(found)
 
+    @once
     def still(self, frame, fixed, start, end):
         """Does the chain not move in the step? Only then is a straight way in it a straight way."""
         if frame == fixed:
             return True
         poses = [self.pose(frame, fixed, s) for s in halves([start] + self.knots(frame, fixed, start, end) + [end])]
         return all((p == poses[0]).all() for p in poses)
-
-
-class Track:
-    """One body: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen of it."""
-    moves = True
-
-    def turns(self, start, end):
-        return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
-
-    def loose(self, start, end):
-        """May the monitor take another path for its, within rigid_tolerance_m?"""
-        return bool(self.knots(start, end)) or self.turns(start, end)
-
-    def loose_at_end(self, start, end):
-        """The same of the place at the end."""
-        return False
 
 
 def halves(stamps):
@@ -206,8 +202,10 @@ def carried(pose, points):
     return points if pose is None else points @ pose[:3, :3].T + pose[:3, 3]
 
 
-class Stream(Track):
-    """A body whose frames came as messages."""
+class Stream:
+    """A body whose frames came as messages: at(stamp, start, end) is where its vertices are within a step, knots() are the stamps of what was seen."""
+    moves = True
+    memory = property(lambda self: self.transforms.memory)
 
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
         self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
@@ -227,6 +225,7 @@ class Stream(Track):
             self.taken += 1
         return self.held
 
+    @once
     def around(self, start, end):
         """The frames that a step from start to end rests on."""
         said, every = self.transforms.said, self.known()
@@ -254,22 +253,24 @@ class Stream(Track):
     def surface(self, start, end):
         return self.around(start, end)[0].surface
 
-    def unchecked(self, start, end):
-        return max(f.unchecked for f in self.around(start, end))
+    def unchecked(self, start, end, mask):
+        """How much of it cannot be looked at, but for these vertices."""
+        return sum(f.unchecked + np.delete(f.unseen, [v for v in mask if v < len(f.unseen)]).sum() for f in self.around(start, end))
 
+    @once
     def knots(self, start, end):
         frames = self.around(start, end)
         if len({f.frame for f in frames}) > 1:
             raise Unknown('%s comes in another frame within the step, and nobody says how it went' % self.name)
         return [f.stamp for f in frames if start < f.stamp < end] + self.transforms.knots(frames[0].frame, self.fixed, start, end)
 
+    @once
     def at(self, stamp, start, end):
         frames = self.around(start, end)
-        i = bisect.bisect_left([f.stamp for f in frames], stamp)
-        b = frames[i]
+        i = min(len(frames) - 1, bisect.bisect_left([f.stamp for f in frames], stamp))
+        a, b = frames[max(0, i - 1)], frames[i]
         points = b.positions
-        if b.stamp != stamp:
-            a = frames[i - 1]
+        if a is not b and b.stamp != stamp:
             points = a.positions + (stamp - a.stamp) / (b.stamp - a.stamp) * (b.positions - a.positions)
         return carried(self.transforms.pose(b.frame, self.fixed, stamp), points)
 
@@ -278,11 +279,36 @@ class Stream(Track):
         frames = self.around(start, end)
         return frames[0].stamp == start and frames[-1].stamp == end and len(frames) == 2 and frames[0].frame == self.fixed
 
+    def turns(self, start, end):
+        return not self.transforms.still(self.carrier(start, end), self.fixed, start, end)
+
+    def loose(self, start, end):
+        """May the monitor take another path for its, within rigid_tolerance_m?"""
+        return bool(self.knots(start, end)) or self.turns(start, end)
+
     def loose_at_end(self, start, end):
+        """The same of the place at the end."""
         return self.around(start, end)[-1].stamp != end and self.turns(start, end)
 
     def carrier(self, start, end):
         return self.around(start, end)[0].frame
+
+
+class Rigid(Stream):
+    """A mesh that a tf frame carries."""
+
+    def __init__(self, name, frame, transforms, fixed):
+        super().__init__(name, [], [], transforms, fixed, 0)
+        self.mesh = frame
+
+    def around(self, start, end):
+        return [self.mesh]
+
+    def exact(self, start, end):
+        return self.mesh.frame == self.fixed
+
+    def loose_at_end(self, start, end):
+        return False
 
 
 class Held(Stream):
@@ -293,6 +319,7 @@ class Held(Stream):
         super().__init__(*words)
         self.tolerance, self.timeout = tolerance, timeout
 
+    @once
     def around(self, start, end):
         said = self.transforms.said
         came = [f for f in self.every if f.came <= said]
@@ -304,18 +331,20 @@ class Held(Stream):
             raise NotCovered('%s comes more often than each max_step_s, and came anew within answer_timeout_s' % self.name)
         return came[-1:]
 
+    @once
     def knots(self, start, end):
         frame, t = self.around(start, end)[0], self.transforms
         held = self.at(start, start, end)
         try:
             knots = t.knots(frame.frame, self.fixed, start, end)
             off = [np.abs(carried(t.pose(frame.frame, self.fixed, s), frame.positions) - held).max() for s in halves([start] + knots + [end])]
-        except Unknown:
+        except NotSent:
             return []  # what is not sent any more counts as at rest
         if max(off) > 2 * self.tolerance:
             raise Unknown('tf has %s elsewhere in the step than where its frame was' % self.name)
         return []
 
+    @once
     def at(self, stamp, start, end):
         frame = self.around(start, end)[0]
         return carried(self.transforms.pose(frame.frame, self.fixed, frame.stamp), frame.positions)
@@ -328,32 +357,6 @@ class Held(Stream):
 
     def loose(self, start, end):
         return self.carrier(start, end) != self.fixed
-
-
-class Rigid(Track):
-    """A mesh that a tf frame carries."""
-
-    def __init__(self, name, positions, surface, lost, frame, transforms, fixed, rough=0.0):
-        self.name, self.positions, self.mesh, self.lost, self.rough = name, positions, surface, lost, rough
-        self.frame, self.transforms, self.fixed = frame, transforms, fixed
-
-    def surface(self, start, end):
-        return self.mesh
-
-    def unchecked(self, start, end):
-        return self.lost
-
-    def knots(self, start, end):
-        return self.transforms.knots(self.frame, self.fixed, start, end)
-
-    def at(self, stamp, start, end):
-        return carried(self.transforms.pose(self.frame, self.fixed, stamp), self.positions)
-
-    def exact(self, start, end):
-        return self.frame == self.fixed
-
-    def carrier(self, start, end):
-        return self.frame
 
 
 def pieces(tracks, start, end, tolerance):

@@ -6,6 +6,7 @@ direction the gap of two points that move on lines is a line.
 
 A feature is a vertex, an edge or a face; what is closed counts, borders included, and so do both ends of the time.
 """
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -26,10 +27,6 @@ def minus(p, q):
     return trimmed([(p[i] if i < len(p) else 0) - (q[i] if i < len(q) else 0) for i in range(n)])
 
 
-def plus(p, q):
-    return minus(p, [-c for c in q])
-
-
 def times(p, q):
     product = [0] * max(0, len(p) + len(q) - 1)
     for i, a in enumerate(p):
@@ -39,38 +36,32 @@ def times(p, q):
 
 
 def at(p, t):
-    value = Fraction(0)
+    value, power = 0, 1
     for c in reversed(p):
-        value = value * t + c
-    return value
+        value, power = value * t.numerator + c * power, power * t.denominator
+    return Fraction(value * t.denominator, power)
 
 
 def sign(x):
     return (x > 0) - (x < 0)
 
 
-def remainder(p, q):
-    p = [Fraction(c) for c in p]
+def divided(p, q):
+    """Quotient and remainder, each times some number above 0."""
+    quotient = [0] * max(0, len(p) - len(q) + 1)
     while len(p) >= len(q):
-        factor, shift = p[-1] / q[-1], len(p) - len(q)
-        p = trimmed([c - factor * q[i - shift] if i >= shift else c for i, c in enumerate(p[:-1])])
-    return p
+        by, factor, shift = abs(q[-1]), sign(q[-1]) * p[-1], len(p) - len(q)
+        quotient = [c * by for c in quotient]
+        quotient[shift] = factor
+        p = trimmed([c * by - factor * q[i - shift] if i >= shift else c * by for i, c in enumerate(p[:-1])])
+    return [[c // (math.gcd(*r) or 1) for c in r] for r in (quotient, p)]
 
 
 def common(p, q):
     """The greatest common divisor, up to a factor."""
     while q:
-        p, q = q, remainder(p, q)
-    return [c / p[-1] for c in map(Fraction, p)]
-
-
-def quotient(p, q):
-    result, p = [Fraction(0)] * (len(p) - len(q) + 1), [Fraction(c) for c in p]
-    while len(p) >= len(q):
-        factor, shift = p[-1] / q[-1], len(p) - len(q)
-        result[shift] = factor
-        p = trimmed([c - factor * q[i - shift] if i >= shift else c for i, c in enumerate(p[:-1])])
-    return result
+        p, q = q, divided(p, q)[1]
+    return p
 
 
 def derivative(p):
@@ -79,52 +70,51 @@ def derivative(p):
 
 def square_free(p):
     d = derivative(p)
-    return quotient(p, common(p, d)) if d else [Fraction(c) for c in p]
+    return divided(p, common(p, d))[0] if d else p
 
 
-class Sturm:
-    """Counts the distinct roots of a polynomial without double roots in (low, high]."""
+def sturm(p):
+    """The chain of a polynomial without double roots."""
+    chain = [p, derivative(p)]
+    while chain[-1]:
+        chain.append([-c for c in divided(chain[-2], chain[-1])[1]])
+    return chain[:-1]
 
-    def __init__(self, p):
-        self.chain = [p, derivative(p)]
-        while self.chain[-1]:
-            self.chain.append([-c for c in remainder(self.chain[-2], self.chain[-1])])
-        self.chain.pop()
 
-    def changes(self, t):
-        signs = [s for s in (sign(at(p, t)) for p in self.chain) if s]
-        return sum(a != b for a, b in zip(signs, signs[1:]))
-
-    def count(self, low, high):
-        return self.changes(low) - self.changes(high)
+def count(chain, low, high):
+    """How many distinct roots there are in (low, high]."""
+    signs = [[s for s in (sign(at(p, t)) for p in chain) if s] for t in (low, high)]
+    before, after = (sum(a != b for a, b in zip(s, s[1:])) for s in signs)
+    return before - after
 
 
 class Root:
     """A root of `p` in [low, high]: low = high, or the only one in (low, high], and not high."""
 
     def __init__(self, p, low, high):
-        self.p, self.low, self.high = p, low, high
+        self.p, self.low, self.high, self.after = p, low, high, sign(at(p, high))
 
     def halve(self):
         middle = (self.low + self.high) / 2
-        if at(self.p, middle) == 0:
+        here = sign(at(self.p, middle))
+        if here == 0:
             self.low = self.high = middle
-        elif sign(at(self.p, middle)) == sign(at(self.p, self.high)):
+        elif here == self.after:
             self.high = middle
         else:
             self.low = middle
 
     def sign_of(self, q):
         """The exact sign of the polynomial q here."""
-        if not q:
+        for bits in (8, 40):
+            narrow(self, bits)
+            value = at(q, self.high)
+            if abs(value) > (self.high - self.low) * sum(i * abs(c) for i, c in enumerate(q)) or self.low == self.high:
+                return sign(value)  # between low and high it changes by less
+        if not q or count(sturm(common(self.p, q)), self.low, self.high) > 0:
             return 0
-        if self.low == self.high:
-            return sign(at(q, self.low))
-        shared = common(self.p, q)
-        if len(shared) > 1 and Sturm(shared).count(self.low, self.high) > 0:
-            return 0
-        counter = Sturm(square_free(q))
-        while self.low != self.high and (at(q, self.low) == 0 or counter.count(self.low, self.high) > 0):
+        chain = sturm(square_free(q))
+        while self.low != self.high and (at(q, self.low) == 0 or count(chain, self.low, self.high) > 0):
             self.halve()
         return sign(at(q, self.high))
 
@@ -134,20 +124,16 @@ def roots(p):
     p = square_free(p)
     if len(p) < 2:
         return []
-    found = [Root(p, Fraction(0), Fraction(0))] if at(p, Fraction(0)) == 0 else []
-    counter = Sturm(p)
-    open_intervals = [(Fraction(0), Fraction(1))]
-    inner = []
-    while open_intervals:
-        low, high = open_intervals.pop()
-        count = counter.count(low, high)
-        if count == 1 and at(p, high) == 0:
-            inner.append(Root(p, high, high))
-        elif count == 1 and at(p, low) != 0:
-            inner.append(Root(p, low, high))
-        elif count > 0:
+    found = [Root(p, Fraction(0), Fraction(0))] if p[0] == 0 else []
+    chain, left, inner = sturm(p), [(Fraction(0), Fraction(1))], []
+    while left:
+        low, high = left.pop()
+        many = count(chain, low, high)
+        if many == 1 and (at(p, high) == 0 or at(p, low) != 0):
+            inner.append(Root(p, high if at(p, high) == 0 else low, high))
+        elif many > 0:
             middle = (low + high) / 2
-            open_intervals += [(low, middle), (middle, high)]
+            left += [(low, middle), (middle, high)]
     return found + sorted(inner, key=lambda root: root.high)
 
 
@@ -172,7 +158,8 @@ def cross(u, v):
 
 
 def dot(u, v):
-    return plus(plus(times(u[0], v[0]), times(u[1], v[1])), times(u[2], v[2]))
+    back = [[-c for c in p] for p in u]
+    return minus(minus(times(u[0], v[0]), times(back[1], v[1])), times(back[2], v[2]))
 
 
 def on_segment(root, p, a, b):
@@ -215,15 +202,15 @@ def first_touch(kind, starts, ends):
         else:
             ends_on = [(p[0], p[2], p[3]), (p[1], p[2], p[3]), (p[2], p[0], p[1]), (p[3], p[0], p[1])]
         events = [q for v, a, b in ends_on for q in cross(way(a, v), way(b, v)) + [dot(way(a, v), way(b, v))] if q]
-        times_ = [Root([Fraction(0), Fraction(1)], Fraction(0), Fraction(0))]
+        times_ = [Root([0, 1], Fraction(0), Fraction(0))]
         times_ += sorted((r for q in events for r in roots(q)), key=lambda r: r.high)
         hits = [r for r in times_ if meets(r, *p)]
         return min(hits, key=narrow, default=None)
     return next((r for r in times_ if meets(r, *p)), None)
 
 
-def narrow(root, bits=64):
-    """The root, to 2^-64: to be said, and to put roots into an order."""
+def narrow(root, bits=40):
+    """The root, to 2^-40: to be said, and to put roots into an order."""
     while root.high - root.low > Fraction(1, 1 << bits):
         root.halve()
     return root.high
@@ -232,11 +219,10 @@ def narrow(root, bits=64):
 def edge_through_face(edge, face):
     """Do they meet at rest?"""
     p = moving(list(edge) + list(face), list(edge) + list(face))
-    value = lambda q: q[0] if q else 0
-    side = lambda a, b, c, d: sign(value(dot(cross(way(a, b), way(a, c)), way(a, d))))
+    still = Root([0, 1], Fraction(0), Fraction(0))
+    side = lambda a, b, c, d: still.sign_of(dot(cross(way(a, b), way(a, c)), way(a, d)))
     e, f, a, b, c = p
     below, above = side(a, b, c, e), side(a, b, c, f)
-    still = Root([Fraction(0), Fraction(1)], Fraction(0), Fraction(0))
     if below == 0 and in_face(still, e, a, b, c) or above == 0 and in_face(still, f, a, b, c):
         return True
     if below * above > 0 or below == above:
@@ -245,7 +231,7 @@ def edge_through_face(edge, face):
     return not {-1, 1} <= turns
 
 
-# -- what floating point rejects ---------------------------------------------------------------------------------------
+# -- what floating point rejects: features are arrays, their corners x 3 last ------------------------------------------
 
 
 def overlapping(low_a, high_a, low_b, high_b, same=False):
@@ -261,119 +247,109 @@ def overlapping(low_a, high_a, low_b, high_b, same=False):
         for at_ in range(first, last, 8192):
             theirs = order_b[at_:min(at_ + 8192, last)]
             meet = np.ones((len(mine), len(theirs)), bool)
-            for k in (axis, (axis + 1) % 3, (axis + 2) % 3):
-                meet &= low_a[mine, k][:, None] <= high_b[theirs, k]
-                meet &= low_b[theirs, k] <= high_a[mine, k][:, None]
+            for la, ha, lb, hb in zip(low_a[mine].T, high_a[mine].T, low_b[theirs].T, high_b[theirs].T):
+                meet &= (la[:, None] <= hb) & (lb <= ha[:, None])
             i, j = np.nonzero(meet)
             found.append(np.stack([mine[i], theirs[j]], 1))
     pairs = np.concatenate(found) if found else np.empty((0, 2), int)
     return pairs[pairs[:, 0] < pairs[:, 1]] if same else pairs
 
 
+def crossed(u, v):
+    return u[..., [1, 2, 0]] * v[..., [2, 0, 1]] - u[..., [2, 0, 1]] * v[..., [1, 2, 0]]
+
+
+def dots(u, v):
+    return np.einsum('...i,...i', u, v)
+
+
+def length(v):
+    return np.sqrt(dots(v, v))
+
+
 def unit(v):
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return np.divide(v, length, out=np.zeros_like(v), where=length > 1e-200)
+    size = length(v)[..., None]
+    return np.divide(v, size, out=np.zeros_like(v), where=size > 1e-200)
 
 
 def apart(a0, a1, b0, b1, distance=0.0):
     """Of n pairs of features (n x corners x 3 each, at both ends): which are certainly further apart than `distance`."""
     if not len(a0):
         return np.zeros(0, bool)
-    directions = [np.broadcast_to(axis, (len(a0), 3)) for axis in np.eye(3)]
     a, b = (a0 + a1) / 2, (b0 + b1) / 2
     between = b.mean(1) - a.mean(1)
-    sides = []
-    for f in (a, b):
-        sides += [f[:, i] - f[:, i - 1] for i in range(f.shape[1] if f.shape[1] > 2 else f.shape[1] - 1)]
-    normals = []
-    if a.shape[1] == 3 or b.shape[1] == 3:
-        f = a if a.shape[1] == 3 else b
-        normals.append(np.cross(f[:, 1] - f[:, 0], f[:, 2] - f[:, 0]))
+    sides = [f[:, i] - f[:, i - 1] for f in (a, b) for i in range(f.shape[1] if f.shape[1] > 2 else f.shape[1] - 1)]
+    normals = [crossed(f[:, 1] - f[:, 0], f[:, 2] - f[:, 0]) for f in (a, b) if f.shape[1] == 3][:1]
     if a.shape[1] == 2 and b.shape[1] == 2:
-        normals.append(np.cross(sides[0], sides[1]))
-    directions += normals + sides + [between]
-    for side in sides:
-        along = unit(side)
-        directions.append(between - (between * along).sum(1, keepdims=True) * along)
-        directions += [np.cross(n, side) for n in normals]
-    size = max(np.abs(x).max() for x in (a0, a1, b0, b1))
-    result = np.zeros(len(a0), bool)
-    left = np.arange(len(a0))
-    for d in directions:
-        if not len(left):
-            break
-        n = unit(np.asarray(d, float)[left])
-        gap = None
+        normals = [crossed(*sides)]
+    likely = [*np.broadcast_to(np.eye(3)[:, None], (3, *between.shape)), *normals, between]
+    along = [unit(side) for side in sides]
+    others = sides + [between - dots(between, s)[:, None] * s for s in along] + [crossed(n, s) for n in normals for s in sides]
+    limit = distance * (1 + ROOM) + ROOM * max(np.abs(x).max() for x in (a0, a1, b0, b1))
+    result, left = np.zeros(len(a0), bool), np.arange(len(a0))
+    for directions in (likely, others):
+        n, gaps = unit(np.stack(directions, 1)[left]), []
         for pa, pb in ((a0, b0), (a1, b1)):
-            u, v = np.einsum('nij,nj->ni', pa[left], n), np.einsum('nij,nj->ni', pb[left], n)
-            one = np.stack([v.min(1) - u.max(1), u.min(1) - v.max(1)], 1)
-            gap = one if gap is None else np.minimum(gap, one)
-        away = (gap > distance * (1 + ROOM) + ROOM * size).any(1)
-        result[left[away]] = True
-        left = left[~away]
+            u, v = (np.einsum('ndj,nij->ndi', n, p[left]) for p in (pa, pb))
+            gaps.append(np.stack([v.min(2) - u.max(2), u.min(2) - v.max(2)]))
+        result[left] = (np.minimum(*gaps) > limit).any((0, 2))
+        left = left[~result[left]]
     return result
 
 
-# -- how near, in doubles: of n pairs at rest (n x corners x 3) --------------------------------------------------------
+# -- how near, in doubles ----------------------------------------------------------------------------------------------
 
 
 def point_to_line(p, a, b):
-    u = b - a
-    square = np.einsum('ni,ni->n', u, u)
-    t = np.clip(np.einsum('ni,ni->n', p - a, u) / np.where(square > 0, square, 1), 0, 1)
-    return np.linalg.norm(p - a - t[:, None] * u, axis=1)
+    u, v = b - a, p - a
+    square = dots(u, u)
+    t = dots(v, u) / np.where(square > 0, square, 1)
+    return length(v - np.minimum(1, np.maximum(0, t))[..., None] * u)
 
 
 def point_to_face(p, f):
-    best = np.minimum(point_to_line(p, f[:, 0], f[:, 1]), point_to_line(p, f[:, 1], f[:, 2]))
-    best = np.minimum(best, point_to_line(p, f[:, 2], f[:, 0]))
-    n = np.cross(f[:, 1] - f[:, 0], f[:, 2] - f[:, 0])
-    sides = [np.einsum('ni,ni->n', np.cross(f[:, (i + 1) % 3] - f[:, i], p - f[:, i]), n) for i in range(3)]
-    above = np.abs(np.einsum('ni,ni->n', unit(n), p - f[:, 0]))
-    return np.where((np.min(sides, 0) > 0), np.minimum(above, best), best)
+    q, sides = p[..., None, :] - f, f[..., [1, 2, 0], :] - f
+    best = point_to_line(p[..., None, :], f, f[..., [1, 2, 0], :]).min(-1)
+    n = crossed(sides[..., 0, :], sides[..., 1, :])
+    above = np.abs(dots(unit(n), q[..., 0, :]))
+    within = (dots(crossed(sides, q), n[..., None, :]) > 0).all(-1)
+    return np.where(within, np.minimum(above, best), best)
 
 
 def line_to_line(p, q):
-    best = np.min([point_to_line(p[:, 0], q[:, 0], q[:, 1]), point_to_line(p[:, 1], q[:, 0], q[:, 1]),
-                   point_to_line(q[:, 0], p[:, 0], p[:, 1]), point_to_line(q[:, 1], p[:, 0], p[:, 1])], 0)
-    u, v, w = p[:, 1] - p[:, 0], q[:, 1] - q[:, 0], p[:, 0] - q[:, 0]
-    dot_ = lambda x, y: np.einsum('ni,ni->n', x, y)
-    a, b, c, d, e = dot_(u, u), dot_(u, v), dot_(v, v), dot_(u, w), dot_(v, w)
+    best = np.minimum(*(point_to_line(x, y[..., :1, :], y[..., 1:, :]).min(-1) for x, y in ((p, q), (q, p))))
+    u, v, w = p[..., 1, :] - p[..., 0, :], q[..., 1, :] - q[..., 0, :], p[..., 0, :] - q[..., 0, :]
+    a, b, c, d, e = dots(u, u), dots(u, v), dots(v, v), dots(u, w), dots(v, w)
     area = a * c - b * b
     some = np.where(area > 1e-12 * a * c, area, 1)
     s, t = (b * e - c * d) / some, (a * e - b * d) / some
     within = (area > 1e-12 * a * c) & (s > 0) & (s < 1) & (t > 0) & (t < 1)
-    return np.where(within, np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1), best)
+    return np.where(within, length(w + s[..., None] * u - t[..., None] * v), best)
 
 
 def point_to_box(p, low, high):
-    return np.linalg.norm(np.maximum(0, np.maximum(low - p, p - high)), axis=1)
+    return length(np.maximum(0, np.maximum(low - p, p - high)))
 
 
 def box_gap(a0, a1, b0, b1):
     """How far apart the boxes of all that the two sweep are."""
     (la, ha), (lb, hb) = ((np.concatenate(p, 1).min(1), np.concatenate(p, 1).max(1)) for p in ((a0, a1), (b0, b1)))
-    return np.linalg.norm(np.maximum(0, np.maximum(la - hb, lb - ha)), axis=1)
+    return length(np.maximum(0, np.maximum(la - hb, lb - ha)))
 
 
-def nearest(distance, starts, ends, reach, rounds=12):
+def nearest(distance, starts, ends, reach):
     """Of pairs that move: which come nearer than the reach, the least distance found on the way, and when. It may be less, never more, in truth."""
-    at_ = lambda t, which: distance(*[s[which] + t[:, None, None] * (e[which] - s[which]) for s, e in zip(starts, ends)])
-    far = sum(np.linalg.norm(e - s, axis=2).max(1) for s, e in zip(starts, ends))  # a distance changes by no more
-    left = np.arange(len(far))
-    best, when = at_(np.full(len(left), 0.5), left), np.full(len(left), 0.5)
-    near = best - far / 2 < reach
-    left, best, when = left[near], best[near], when[near]
-    if rounds and len(left):
-        grid = [at_(np.full(len(left), t), left) for t in np.linspace(0, 1, 9)]
-        best, when = np.min(grid, 0), np.argmin(grid, 0) / 8
-        near = best - far[left] / 16 < reach
+    at_ = lambda t: distance(*[s[left] + t[..., None, None] * (e[left] - s[left]) for s, e in zip(starts, ends)])
+    far = sum(length(e - s).max(1) for s, e in zip(starts, ends))  # a distance changes by no more
+    left, when, room = np.arange(len(far)), np.full(len(far), 0.5), 0.5
+    best = at_(when)
+    for half in (1 / 2, 1 / 8, 1 / 32, 1 / 128, 1 / 512):
+        near = best - room * far[left] < reach
         left, best, when = left[near], best[near], when[near]
-        low, high = np.maximum(0, when - 0.125), np.minimum(1, when + 0.125)
-        for _ in range(rounds if len(left) else 0):
-            x, y = low + (high - low) * 0.382, low + (high - low) * 0.618
-            dx, dy = at_(x, left), at_(y, left)
-            low, high = np.where(dx > dy, x, low), np.where(dx > dy, high, y)
-            for t, d in ((x, dx), (y, dy)):
-                when, best = np.where(d < best, t, when), np.minimum(best, d)
+        if not far[left].any():
+            break
+        t = np.clip(when + half * np.linspace(-1, 1, 9)[:, None], 0, 1)
+        d = at_(t)
+        least = d.argmin(0), np.arange(len(left))
+        best, when, room = d[least], t[least], 1 / 16
     return left, best, when

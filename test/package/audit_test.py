@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import re
+import struct
 import sys
 import unittest
 from fractions import Fraction
@@ -14,6 +15,7 @@ import genpy
 from analyze_bag_support import OWN, AnalyzeBagTestCase
 import rospy
 from octomap_msgs.msg import Octomap
+from sensor_msgs.msg import PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
 
 from bag_messages import cloud, messages_of, transform, write_bag
@@ -119,14 +121,14 @@ class AuditTest(AnalyzeBagTestCase):
         self.assertRegex(said, r'^audit_bag: .*none\.bag')
 
     def test_it_shares_nothing_and_is_read_in_an_hour(self):
-        allowed = {'argparse', 'bisect', 'dataclasses', 'fractions', 'json', 'os', 'random', 're', 'struct', 'subprocess', 'sys',
+        allowed = {'argparse', 'bisect', 'dataclasses', 'fractions', 'json', 'math', 'os', 'random', 're', 'struct', 'subprocess', 'sys',
                    'tempfile', 'time', 'xml.etree.ElementTree', 'numpy', 'rosbag', 'yaml', 'came', 'owned', 'placed', 'touches'}
         for path in FILES:
             for node in ast.walk(ast.parse(path.read_text())):
                 names = [a.name for a in node.names] if isinstance(node, ast.Import) else \
                     [node.module] if isinstance(node, ast.ImportFrom) else []
                 self.assertLessEqual(set(names), allowed, path)
-        self.assertLessEqual(sum(p.read_text().count('\n') for p in FILES), 2475)
+        self.assertLessEqual(sum(p.read_text().count('\n') for p in FILES), 2573)
 
 
 FINGER = 'v -.02 -.02 -.02\nv .02 -.02 -.02\nv 0 .02 -.02\nv 0 0 .02\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
@@ -156,13 +158,13 @@ class CellTest(FolderTestCase):
         (cls.folder / 'finger.obj').write_text(FINGER)
         (cls.folder / 'arm.urdf').write_text(ARM)
 
-    def cell(self, name, words='', down=0.03, lowest=-0.01, obstacle='false', maps=(), more=lambda at: []):
+    def cell(self, name, words='', down=0.03, lowest=-0.01, obstacle='false', maps=(), more=lambda at: [], finger_at=(0.2, 0.05), cell=CELL):
         """The bag, its parameters, and what analyze_bag says of it."""
         at = lambda k: rospy.Time(100 + k // 10, k % 10 * 10 ** 8 + 1)
         rows = [('/plate', cloud([(x, y, 0) for x in (-.1, .1) for y in (-.1, .1)], at(0), rows=2), at(0))]
         rows += [('/octomap_binary', m, at(0)) for m in maps] + more(at)
         for k in range(11):
-            tool, finger = transform('tool', at(k), x=0.3), transform('finger', at(k), w=0.6, x=0.2 + 0.002 * k, z=0.05)
+            tool, finger = transform('tool', at(k), x=0.3), transform('finger', at(k), w=0.6, x=finger_at[0] + 0.002 * k, z=finger_at[1])
             finger.transform.rotation.z = 0.8
             palm = transform('palm', at(k), x=0.3, z=-0.1)
             rows.append(('/tf', TFMessage([tool, finger, palm]), at(k)))
@@ -170,7 +172,7 @@ class CellTest(FolderTestCase):
             rows.append(('/cloth', cloud([(0.05 * i - 0.08, 0.05 * j - 0.07, z + 0.001 * i * j) for i in range(4) for j in range(4)],
                                          at(k)), at(k)))
         self.params = self.folder / 'cell.yaml'
-        self.params.write_text(CELL.replace('FOLDER', str(self.folder)).replace('OBSTACLE', obstacle) + words)
+        self.params.write_text(cell.replace('FOLDER', str(self.folder)).replace('OBSTACLE', obstacle) + words)
         self.bag, out = write_bag(self.folder / 'cell.bag', rows), self.folder / (name + '.bag')
         ran = run(TOOLS / 'analyze_bag', self.bag, '--params', self.params, '-o', out, '--report', self.folder / name, '--quiet')
         self.assertIn(ran.returncode, (0, 3), ran.stderr)
@@ -187,17 +189,26 @@ class CellTest(FolderTestCase):
         self.assertEqual((status, verdict['refuted'], verdict['not_covered']), (0, [], []), said)
         self.assertGreaterEqual(sum(m.proved for t, m, _ in self.said if t == OWN + 'state'), least, said)
 
-    def refuted(self, topic, change, claim, reason):
+    def told(self, topic, change):
+        """The verdict where each message of a topic is changed, of ~state each that is proved; or left out."""
         changed = []
 
         def lie(at, message):
             if at == OWN + topic and (topic != 'state' or message.proved):
                 changed.append(change(message))
             return None if changed and changed[-1] == 'left out' and at == OWN + topic else message
-        status, verdict, said = self.judged(lie)
+        return self.judged(lie)
+
+    def refuted(self, topic, change, claim, reason):
+        status, verdict, said = self.told(topic, change)
         self.assertEqual(status, 1, said)
         self.assertEqual({row['claim'] for row in verdict['refuted']}, {claim}, said)
         self.assertRegex(' '.join(row['reason'] for row in verdict['refuted']), reason)
+
+    def not_covered(self, reason, topic='state', change=lambda message: None):
+        status, verdict, said = self.told(topic, change)
+        self.assertEqual((status, verdict['refuted']), (3, []), said)
+        self.assertRegex(' '.join(row['reason'] for row in verdict['not_covered']), reason)
 
     @staticmethod
     def nothing_touches(message):
@@ -306,6 +317,201 @@ class CellTest(FolderTestCase):
                 patch.is_new = False
         self.refuted('patches', old, 'proved', 'no patch of the two is new')
         self.refuted('events', lambda message: 'left out', 'proved', 'no event says')
+
+
+    # -- what is not looked at does not hold ---------------------------------------------------------------------------
+
+    def test_what_was_attached(self):
+        self.cell('attached', lowest=0.1)
+
+        def hold(message):
+            message.bodies.append('rod')
+        self.not_covered('~attach: rod', 'contacts', hold)
+        self.said = [(topic, message, at + rospy.Duration(0, 1)) for topic, message, at in self.said]  # as recorded live
+        self.not_covered('~contacts says, was not recorded', 'contacts', lambda message: 'left out')
+
+    def test_parameters_that_it_does_not_know(self):
+        self.cell('unknown', lowest=0.1)
+        for words in ('queue_policy: thin\n', 'look_behind_s: 1\n'):
+            whole = self.params.read_text()
+            self.params.write_text(whole + words)
+            self.not_covered(words.split(':')[0])
+            self.params.write_text(whole)
+        self.params.write_text(whole.replace('topic: /cloth,', 'topic: /cloth, max_acceleration_m_s2: 2,'))
+        self.not_covered('max_acceleration_m_s2')
+
+    def test_words_that_no_state_covers(self):
+        self.cell('bits', lowest=-0.004)
+
+        def true(message):
+            message.data = True
+        self.refuted('clear', true, 'left over', '~clear is true, and ~state is not')
+        first = min(m.holds_until for t, m, _ in self.said if t == OWN + 'state' and m.clear)
+
+        def silent(message):
+            return 'left out' if message.holds_until == first else None
+        status, verdict, said = self.told('state', silent)
+        self.assertEqual(status, 1, said)
+        self.assertIn('~safe_until says something of a step, and no ~state tells of that', [row['reason'] for row in verdict['refuted']])
+
+    def test_a_state_without_a_step(self):
+        self.cell('stepless', lowest=0.1)
+
+        def stepless(message):
+            message.start = message.holds_until = rospy.Time()
+        status, verdict, said = self.told('state', stepless)
+        self.assertEqual((status, verdict['refuted'][0]['reason']), (1, 'no frame came for 0.000000000 s'), said)
+
+    def test_what_is_said_again_when_more_has_come(self):
+        self.cell('again', lowest=0.1)
+        first = next(row for row in self.said if row[0] == OWN + 'state' and row[1].proved)
+        again = copy.deepcopy(first[1])
+        again.header.stamp = first[2] + rospy.Duration(0, 750000000)
+        self.said.append((OWN + 'state', again, again.header.stamp))
+        status, verdict, said = self.judged()
+        self.assertEqual(status, 1, said)
+        self.assertRegex(verdict['refuted'][0]['reason'], 'a frame of cloth came .* before this was said, and it has no answer')
+
+    def test_what_claims_nothing_does_not_count(self):
+        self.cell('silent', lowest=0.1)
+        status, verdict, said = self.judged(lambda topic, message: message if topic in (OWN + 'state', OWN + 'contacts') else None)
+        proved = [m for t, m, _ in self.said if t == OWN + 'state' and m.proved]
+        nearest = [m for m in proved if m.clearance_lower > 0]
+        self.assertEqual((status, verdict['held']), (0, len(proved) + len(nearest)), said)
+        self.cell('no map', 'octomap_topic: /octomap_binary\n', lowest=0.1, obstacle='true')
+        status, verdict, said = self.judged(lambda topic, message: message if topic in (OWN + 'state', OWN + 'contacts', OWN + 'clearance') else None)
+        self.assertEqual((status, verdict['held'], verdict['refuted']), (3, 0, []), said)
+        self.assertRegex(said, '[1-9][0-9]* steps of which nothing is claimed')
+
+    def test_a_mask_and_another_vertex(self):
+        nan = float('nan')
+        lost = lambda at: [('/plate', cloud([(x, y, nan if x > 0 and y > 0 else 0) for x in (-.1, .1) for y in (-.1, .1)], at(0), rows=2),
+                            at(0) + rospy.Duration(0, 1000))]
+        words = CELL.replace('motion: static,', 'motion: static, vertex_mask: [0],')
+        self.cell('mask', lowest=0.1, more=lost, cell=words)
+
+        def prove(topic, message):
+            if topic == OWN + 'state' and message.holds_until.to_nsec():
+                message.proved, message.clear, message.touching = True, True, 0
+            return message
+        status, verdict, said = self.judged(prove)
+        self.assertEqual(status, 1, said)
+        self.assertIn('plate has vertices or faces that cannot be checked', [row['reason'] for row in verdict['refuted']])
+
+    def test_an_edge_that_stands_through_a_face_all_the_time(self):
+        self.cell('through', down=1, lowest=0.05, finger_at=(-0.02, 0.05))
+        self.holds()
+        last = [m for t, m, _ in self.said if t == OWN + 'state'][-1]
+        self.assertEqual((last.proved, last.touching), (True, 1))
+
+        def clear(message):
+            if message.holds_until == last.holds_until:
+                self.nothing_touches(message)
+        self.refuted('state', clear, 'clear', 'meet at 0|goes through face')
+
+        def hide(message):
+            message.intersections = []
+        self.refuted('contacts', hide, 'proved', 'goes through face .* and that is not listed')
+
+        def apart(distance):
+            distance.status, distance.lower, distance.upper = 1, 1e-4, float('nan')
+
+        def row_apart(message):
+            for row in message.pairs:
+                if set(row.bodies) == {'cloth', 'finger'} and row.at_end.status == 2:
+                    apart(row.at_end)
+        self.refuted('clearance', row_apart, 'clearance', 'goes through face .* apart at the end')
+
+    def test_distances_that_are_cut_or_none(self):
+        self.cell('cut', lowest=0.1)
+
+        def touch(distance):
+            distance.status, distance.lower, distance.upper = 2, 0, 0
+        still = lambda m: [touch(row.over_step) for row in m.pairs if set(row.bodies) == {'cloth', 'plate'}]
+        self.refuted('clearance', still, 'clearance', 'are said to touch over the step, and nothing')
+
+        def late(distance):
+            distance.status = 3
+            distance.upper -= 1e-3
+        self.refuted('clearance', lambda m: self.rows(m, late), 'clearance', 'what the row names')
+
+    def test_the_nearest_two(self):
+        self.cell('nearest', lowest=0.1)
+
+        def farther(message):
+            message.clearance_lower += 1e-3
+        self.refuted('state', farther, 'nearest', 'the nearest two are said to be')
+
+    def test_a_body_and_itself(self):
+        self.cell('itself', 'clearance: {self_m: 0.06}\n', lowest=0.1, cell=CELL.replace('"on"', '"on", body_body: "off"'))
+        self.holds()
+
+        def farther(message):
+            for row in message.pairs:
+                if row.bodies[0] == row.bodies[1]:
+                    row.at_end.lower *= 10
+        self.refuted('clearance', farther, 'clearance', 'cloth and self are .* apart at the end')
+
+        def longer(message):
+            if message.seconds > 0:
+                message.until += genpy.Duration(0, 100000000)
+        self.refuted('safe_until', longer, 'safe_until', 'of cloth and .* of self are .* are promised')
+
+    def test_lists_of_links_and_patches_that_are_not_there(self):
+        (self.folder / 'low.urdf').write_text(ARM.replace('0 0 0.05', '-0.3 0 0.1'))
+        self.cell('hidden', 'robot: {description: %s/low.urdf, own_voxels_m: 0}\n' % self.folder, lowest=0.12)
+
+        def hide(message):
+            message.contacts, message.total_contacts = [], 0
+        self.refuted('contacts', hide, 'proved', 'cloth and tool meet, and no contact of the two is listed')
+        first = next(m.header.stamp for t, m, _ in self.said if t == OWN + 'patches' and any(p.is_new for p in m.patches))
+        self.not_covered('patches of this step were not recorded', 'patches', lambda m: 'left out' if m.header.stamp == first else None)
+
+    def test_own_voxels_and_a_static_frame_that_is_sent_elsewhere(self):
+        """Of two voxels that appear, one lies at a plate that is elsewhere later: it is the plate's own."""
+        words = 'octomap_topic: /octomap_binary\nown_voxels_m: 0.02\n'
+
+        def more(keys, at):
+            plate = cloud([(x, y, 0) for x in (-.1, .1) for y in (-.1, .1)], at(0), rows=2)
+            plate.header.frame_id = 'mount'
+            mounts = [('/tf_static', TFMessage([transform('mount', at(0), x=x)]), when) for x, when in ((0, at(0)), (0.5, at(4)))]
+            return [*mounts, ('/table', plate, at(0)), self.voxels([(9, 9, 9)], at(0)), self.voxels([(9, 9, 9), *keys], at(2))]
+        body = CELL.replace('/plate', '/table').replace('cloth: {', 'cloth: {own_voxels_m: 0, ')
+        self.cell('own of a plate', words, down=1, lowest=0.03, obstacle='true', more=lambda at: more([(0, 0, 0)], at), cell=body)
+        self.holds(3)
+        self.assertIn((True, rospy.Time(100, 200000001)), [(m.clear, m.map_stamp) for t, m, _ in self.said if t == OWN + 'state'])
+        self.cell('elsewhere', words, down=1, lowest=0.08, obstacle='true', more=lambda at: more([(0, 0, 1)], at), cell=body)
+        self.holds(3)
+        self.refuted('state', self.nothing_touches, 'clear', 'of cloth and .* of octomap meet')
+
+    def test_what_an_older_cloud_shows(self):
+        """A point of the first cloud alone, to which no ray comes again."""
+        points = lambda at: [('/points', cloud([(0.012, 0.013, 0.08)] * (k == 0) + [(0.4, 0.4, 0.4)], at(k)), at(k)) for k in range(11)]
+        self.cell('older', 'obstacle_cloud_topics: [{topic: /points, sensor_frame: finger}]\n', lowest=0.08, obstacle='true', more=points)
+        self.holds(7)
+        self.refuted('state', self.nothing_touches, 'clear', 'of cloth and .* of octomap meet')
+
+    def test_clouds_that_say_where_they_were_seen_from(self):
+        def seen(at, places):
+            message = PointCloud2(height=1, width=2, point_step=24, row_step=48, is_dense=True)
+            message.header.frame_id, message.header.stamp = 'world', at
+            message.fields = [PointField(name=n, offset=4 * i, datatype=7, count=1) for i, n in enumerate(('x', 'y', 'z', 'vp_x', 'vp_y', 'vp_z'))]
+            message.data = struct.pack('<12f', 0.012, 0.013, 0.08, *places[0], 0.4, 0.4, 0.4, *places[1])
+            return '/points', message, at
+        one, two = (0.2, 0, 0.05), (0.2, 0, 0.06)
+        self.cell('seen from', 'obstacle_cloud_topic: /points\n', lowest=0.08, obstacle='true',
+                  more=lambda at: [seen(at(k), (one, one)) for k in range(11)])
+        self.holds(7)
+        self.refuted('state', self.nothing_touches, 'clear', 'of cloth and .* of octomap meet')
+        self.cell('seen from two', 'obstacle_cloud_topic: /points\n', lowest=0.08, obstacle='true',
+                  more=lambda at: [seen(at(k), (one, one if k < 6 else two)) for k in range(11)])
+        self.assertEqual(self.judged()[0], 0)
+
+        def prove(topic, message):
+            if topic == OWN + 'state' and message.holds_until.to_nsec():
+                message.proved, message.clear, message.map_stamp = True, message.touching == 0, message.holds_until
+            return message
+        self.assertRegex(str(self.judged(prove)[1]['refuted']), 'seen from different places')
 
 
 class TouchesTest(unittest.TestCase):

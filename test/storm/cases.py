@@ -438,6 +438,48 @@ def a_camera_in_a_frame_that_tf_has_late(c):
             row[0], row[1].transforms[0].header.stamp = '/tf', worlds.stamp(c.ns(.4))
 
 
+def a_cloud_that_showed_what_no_ray_reaches_again(c):
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    camera(c, lambda t: [(.012, .013, .021)] * (t < .1) + [(.4, .4, .4)], every(.1, 1.0, -.05))
+
+
+def clouds_that_say_where_they_were_seen_from(c):
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    camera(c, lambda t: [(.012, .013, 1.021), (.4, .4, 1.4)], every(.1, 1.0, -.05))
+    for row in c.rows:
+        if row[0] == '/points':
+            row[1].header.frame_id = 'world'
+            worlds.seen_from(row[1], (0, 0, 1))
+
+
+def a_static_body_in_a_frame_that_is_at_two_places(c):
+    """At one stamp tf has it above the sheet and below."""
+    c.body('sheet', SHEET, 3, every(.1))
+    c.body('table', SMALL, 2, [-.05], frame='cart', motion='static')
+    c.tf('cart', every(.01, 1.1, -.1), z=lambda t: .1)
+    c.tf('cart', [.45], z=lambda t: -.1, delay=.0007)
+
+
+def own_voxels_beside_a_static_frame_that_is_sent_elsewhere(c):
+    """The table stood at a voxel when a map first showed that, and a finger comes to it later."""
+    c.params.update(own_voxels_m='auto', own_voxels_lag_s=0)
+    c.body('sheet', SMALL, 2, every(.1), z=down)
+    c.tf('mount', [-.2], x=.3, topic='/tf_static')
+    c.body('table', SMALL, 2, [-.05], frame='mount', motion='static', against_obstacle=False)
+    c.tf('mount', [.35], x=.6, topic='/tf_static')
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0), (6, 0, 0)], .15)
+
+
+def a_transform_that_comes_again_elsewhere_before_the_answer(c):
+    """The end of a step at 0.5 s lies between two samples; the later one comes again elsewhere, then the frame that the answer waits for."""
+    c.body('sheet', SHEET, 3, every(.1))
+    c.body('object', SMALL, 2, every(.1, 1.03, -.07), z=lambda t: .3, delay=.06)
+    c.tf('finger', every(.02, 1.11, -.11), z=lambda t: .3)
+    c.tf('finger', [.51], z=lambda t: -.3, delay=.03)
+    c.finger('finger')
+
+
 CASES = {name: make for name, make in list(globals().items()) if callable(make) and getattr(make, '__code__', None)
          and make.__code__.co_varnames[:1] == ('c',) and make.__code__.co_argcount == 1}
 

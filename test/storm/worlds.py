@@ -91,6 +91,7 @@ class World:
             self.map()
         self.options()
         self.camera(random.Random(-seed))  # of its own, so that worlds without a camera stay what they were
+        self.rarely(random.Random(seed + NS))
         self.rows.sort(key=lambda row: row[2])
         self.faults = []
         if not self.tame:
@@ -233,6 +234,34 @@ class World:
         for at in [0.02 + .1 * k for k in range(int(10 * self.seconds))]:
             seen = [p for p in points if r.random() < .9] + [(r.uniform(-.2, .2), r.uniform(-.2, .2), r.uniform(-.2, .2))]
             self.add('/points', self.cloud(seen, 1, self.ns(at), 'mount'), at, .03)
+        if r.random() < .3:  # in the map's own frame, and with the place that they were seen from
+            for row in self.rows:
+                if row[0] == '/points':
+                    row[1].header.frame_id = 'world'
+                    seen_from(row[1], (.02, 0, 0))
+
+    def rarely(self, r):
+        """What few are told: distances of a body from itself, noise, pairs with a separation of their own, shells, phases."""
+        p, names = self.params, list(self.params['bodies'])
+        if self.tame:
+            return
+        if 'effects' in p and r.random() < .5:
+            p['clearance'] = {'self_m': r.choice([.15, .3])}
+        one = p['bodies'][r.choice(names)]
+        if 'accuracy' in p and r.random() < .5:
+            one['uncertainty'] = {'radius_m': r.choice([.001, .005])}
+            one['self_collision'] = False
+        if 'accuracy' in p and r.random() < .3 and len(names) > 1:
+            p['minimum_separation_pairs'] = [{'between': r.sample(names, 2), 'separation_m': r.choice([0, .004, .02])}]
+        if r.random() < .2:
+            p['bodies'][r.choice(names)][r.choice(['shell', 'against_bodies'])] = r.random() < .5
+        if r.random() < .2:
+            name = r.choice(names)
+            row = {'between': [name, r.choice([n for n in names if n != name] + ['octomap'])], 'phase': r.choice(['lay', 'carry'])}
+            if r.random() < .5:
+                row['vertices'] = {name: [0, 1, 2, 3]}
+            p.setdefault('expected_contacts', []).append(row)
+            p['phase'] = r.choice([row['phase'], ''])
 
     def options(self):
         r, p = self.r, self.params
@@ -299,6 +328,12 @@ class World:
                 restamped(one[1], int(by))
         elif kind == 'damaged':
             row[1] = damaged(copied(row[1]), r)
+
+
+def seen_from(cloud, place):
+    cloud.fields += [PointField(name='vp_' + n, offset=12 + 4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate('xyz')]
+    cloud.data = b''.join(cloud.data[i:i + 12] + struct.pack('<3f', *place) for i in range(0, len(cloud.data), 12))
+    cloud.point_step, cloud.row_step = 24, 24 * cloud.width
 
 
 def copied(message):
