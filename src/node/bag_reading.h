@@ -26,6 +26,8 @@ class TransformWindow {
   /// A mesh with this stamp (0: none) is the next message of the bag.
   void meshComes(std::size_t body, StampNs stamp_ns, const ros::Time& at);
   void feedUntil(const ros::Time& at);
+  /// Of what came up to then some is not fed: it waits for the meshes.
+  bool isBehind(const ros::Time& at) { return waiting_ && next_->getTime() <= at; }
 
  private:
   /// None of what is no TFMessage, and of one that is damaged, which the feed hears.

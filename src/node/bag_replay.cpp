@@ -404,6 +404,9 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
       for (const std::size_t body : bodies->second) transforms.meshComes(body, stampOf(m.getDataType(), bytes), at);
     }
     transforms.feedUntil(at);
+    run.pipeline.doubtTransforms(transforms.isBehind(at)
+                                     ? "stamps of tf went back before this frame, and those of the meshes have not yet"
+                                     : "");
     for (const std::string& line : run.feed.takeProblems()) run.complain("tf: " + line);
     if (is_mesh) run.meshes(bodies->second, m, bytes);
     run.clouds.hearCameraInfo(m);

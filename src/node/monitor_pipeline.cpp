@@ -205,6 +205,7 @@ void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
   nameUnwatched(outcome);
   nameNewerMap(came_ns, outcome);
   nameClocks(outcome);
+  if (outcome.answered && !transforms_doubt_.empty()) outcome.unproved.push_back(transforms_doubt_);
   for (std::size_t b = 0; b < passed_over_.size() && outcome.answered; ++b) {
     if (!passed_over_[b].may_be_things) continue;
     outcome.excluded.push_back("messages of other markers on the topic of body '" + config_.bodies[b].body.name + "'");

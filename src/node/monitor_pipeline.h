@@ -61,6 +61,8 @@ class MonitorPipeline {
   }
   /// The same of the newest that has a place, or was refused.
   std::int64_t placedMapNs() const { return settled_map_ns_; }
+  /// Why tf is not all that came of it, which ends proofs; empty: it is.
+  void doubtTransforms(std::string why) { transforms_doubt_ = std::move(why); }
   /// Somebody is there who publishes maps: from now on a step without one lacks it.
   void expectMap() { effects_.expectMap(); }
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
@@ -166,6 +168,7 @@ class MonitorPipeline {
   MonitorConfig config_;
   EffectTracker effects_;
   const TransformFeed& transforms_;
+  std::string transforms_doubt_;
   std::string fixed_frame_;
   TransformTracks tracks_{transforms_, fixed_frame_};
   std::unique_ptr<Monitor> monitor_;
