@@ -464,6 +464,15 @@ TEST_F(MarkerGrammar, NamespacesInTurn) {
   one.markers = {marker(), other};
   EXPECT_EQ(read(one).dropped_faces, 1u) << "one array is one frame";
   EXPECT_EQ(read(one).dropped_faces, 1u);
+  for (const std::int32_t type : {MARKER_LINE_STRIP, MARKER_LINE_LIST, MARKER_POINTS}) {
+    anew();
+    config.source = type == MARKER_POINTS ? TopologySource::POLYLINE : TopologySource::AUTO;
+    visualization_msgs::Marker rope = marker(SQUARE);
+    rope.type = type;
+    EXPECT_EQ(read(rope).positions.size(), 4u);
+    rope.ns = "guide";
+    EXPECT_TRUE(mentions(refusalOf(rope), "('cloth', 2) and with ('guide', 2) come in turn")) << type;
+  }
 }
 
 TEST_F(MarkerGrammar, IdsInTurn) {

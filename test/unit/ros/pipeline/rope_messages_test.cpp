@@ -118,6 +118,28 @@ TEST(RopeMessages, WhatNobodyLooksAtIsSaid) {
       << cloth.pipeline.hint(0);
 }
 
+// Two ropes at rest, each in messages of its own, one of them above the other: without a name nobody knows which is
+// the rope. With one the other is no frame, and nothing is missing between two frames of the first.
+TEST(RopeMessages, OfTwoInTurnTheNamedOneIsProvedAndWithoutANameNone) {
+  for (const bool is_named : {false, true}) {
+    Driven ropes(scene(is_named ? "marker: {namespace: a}" : ""));
+    int clear = 0, refused = 0;
+    for (int k = 0; k < 12; ++k) {
+      const double z = k % 2 == 0 ? 0 : 0.3;
+      visualization_msgs::Marker one = rope(1 + 0.1 * k, 0, MARKER_LINE_STRIP, {{0, 0, z}, {0.5, 0, z}, {1, 0, z}});
+      one.ns = k % 2 == 0 ? "a" : "b";
+      ropes.pipeline.take(0, {ros::message_traits::datatype(one), bytesOf(one), 0, 0});
+      while (ropes.pipeline.nextOutcome(0, ropes.outcome)) {
+        clear += assuranceOf(ropes.outcome).clear();
+        refused += ropes.outcome.status == StepStatus::BAD_MESSAGE;
+      }
+    }
+    EXPECT_EQ(clear, is_named ? 5 : 0) << ropes.outcome.reason;
+    EXPECT_EQ(refused, is_named ? 0 : 11);
+    EXPECT_EQ(ropes.pipeline.counters().markers_passed_over, is_named ? 6u : 0u);
+  }
+}
+
 TEST(RopeMessages, PosesOfARopeThatCrossesItself) {
   const auto poses = [](double stamp_s, double z) {
     geometry_msgs::PoseArray out;
