@@ -243,20 +243,20 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
   };
   MonitorOptions options = loose();
   options.detector.unfolded_test = false;  // else there is nothing to search in what one sees from above
-  const auto shortest_ms = [&](bool check_start_state) {
+  const auto shorter = [&](bool check_start_state, double& shortest_ms) {
     options.detector.check_start_state = check_start_state;
-    double ms = 1e9;
     Monitor monitor(options, clockAndBar());
-    for (int i = 0; i < 20; ++i) {
-      monitor.reset(StepStatus::RESET);
-      next(monitor);
-      const Outcome outcome = next(monitor);
-      EXPECT_GT(outcome.substeps, 5u);
-      ms = std::min(ms, outcome.stats.total_ms);
-    }
-    return ms;
+    next(monitor);
+    const Outcome outcome = next(monitor);
+    EXPECT_GT(outcome.substeps, 5u);
+    shortest_ms = std::min(shortest_ms, outcome.stats.total_ms);
   };
-  const double contacts_ms = shortest_ms(false), with_search_ms = shortest_ms(true);
+  // In turns, until something else on the machine has let both alone once.
+  double contacts_ms = 1e9, with_search_ms = 1e9;
+  for (int i = 0; i < 20 || (i < 400 && !(with_search_ms > 1.5 * contacts_ms)); ++i) {
+    shorter(false, contacts_ms);
+    shorter(true, with_search_ms);
+  }
   ASSERT_GT(with_search_ms, 1.5 * contacts_ms);
   if (std::getenv("DEFORMABLE_CCD_SANITIZED")) GTEST_SKIP() << "a sanitizer's steps take twice as long at times";
   options.detector.step_budget_ms = std::min(2 * contacts_ms, (contacts_ms + with_search_ms) / 2);
