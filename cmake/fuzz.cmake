@@ -20,7 +20,8 @@ file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 set(DECODER_SOURCES ${MESSAGE_TYPES}
   scenes/physics/scene_file.cpp scenes/physics/shapes.cpp
   src/config/parameter_reader.cpp src/config/parameter_yaml.cpp src/input/dae_file.cpp src/input/depth_surface.cpp
-  src/input/known_types.cpp src/input/marker_names.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp
+  src/input/known_types.cpp src/input/marker_meshes.cpp src/input/marker_names.cpp src/input/marker_ropes.cpp
+  src/input/mesh_decoder.cpp
   src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_layout.cpp src/input/message_type.cpp
   src/input/obj_file.cpp src/input/ply_file.cpp src/input/ply_header.cpp src/input/polygons.cpp
   src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp src/node/map_decode.cpp

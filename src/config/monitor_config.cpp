@@ -175,9 +175,8 @@ std::vector<std::string> beyondLimits(const MonitorConfig& config) {
     if (body.input.source != TopologySource::DEPTH_IMAGE) continue;
     const DepthSurfaceOptions &depth = body.input.depth, plain;
     const std::string what = "what the picture of body '" + body.body.name + "' shows ";
-    const std::string section = "topology/";
-    if (depth.max_range_m > 0) add(what + "farther than ", depth.max_range_m, section + "max_range_m");
-    if (depth.min_range_m > plain.min_range_m) add(what + "nearer than ", depth.min_range_m, section + "min_range_m");
+    if (depth.max_range_m > 0) add(what + "farther than ", depth.max_range_m, "topology/max_range_m");
+    if (depth.min_range_m > plain.min_range_m) add(what + "nearer than ", depth.min_range_m, "topology/min_range_m");
   }
   return sentences;
 }

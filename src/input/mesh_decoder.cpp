@@ -1,8 +1,6 @@
 #include "input/mesh_decoder.h"
 
 #include <algorithm>
-#include <array>
-#include <set>
 #include <sstream>
 
 #include "input/marker_ropes.h"
@@ -16,14 +14,13 @@ namespace {
 // A tracker has fewer points than a quarter of the smallest depth camera has pixels.
 constexpr std::size_t LEAST_PICTURE = 160 * 120;
 
-[[noreturn]] void refuse(const std::string& text) { throw MeshError(StepStatus::BAD_MESSAGE, text); }
-
 void requireSomething(const PolygonFaces& faces) {
   if (!faces.faces.empty()) return;
-  refuse("there is nothing to check: " +
-         (faces.ends.empty() ? "the message has no triangle"
-                             : "none of its " + std::to_string(faces.ends.size()) +
-                                   " faces can be used; they name a vertex twice, or are no polygons with an area"));
+  refuseMessage("there is nothing to check: " +
+                (faces.ends.empty()
+                     ? "the message has no triangle"
+                     : "none of its " + std::to_string(faces.ends.size()) +
+                           " faces can be used; they name a vertex twice, or are no polygons with an area"));
 }
 
 std::size_t faceCount(const IndexedView& mesh) {
@@ -53,30 +50,8 @@ Polygons polygonsOf(const IndexedView& mesh) {
 void requireVertices(const Polygons& polygons, std::size_t points) {
   for (const Index v : polygons.corners) {
     if (v < points) continue;
-    refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
+    refuseMessage("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
   }
-}
-
-/// Of a triangle list. Of lines and points, scale is how thick they are drawn.
-Eigen::Affine3d poseAndScaleOf(const MarkerView& marker) {
-  Eigen::Affine3d transform = poseOf(marker);
-  const Vec3 scale(marker.scale[0], marker.scale[1], marker.scale[2]);
-  if (!scale.allFinite()) refuse("scale is not finite");
-  if (scale.isZero(0)) return transform;  // it was never set
-  if ((scale.array() == 0).any()) {
-    std::ostringstream text;
-    text << "scale is (" << scale.x() << ", " << scale.y() << ", " << scale.z()
-         << "), which leaves the mesh no depth; set no component to 0, or all three for no scale";
-    refuse(text.str());
-  }
-  transform.linear() = transform.linear() * scale.asDiagonal();
-  return transform;
-}
-
-/// Arrows and texts are none, nor is what is taken away.
-bool mayBeThing(const MarkerView& marker) {
-  return marker.action == MARKER_ADD && marker.type != MARKER_ARROW && marker.type != MARKER_TEXT &&
-         (!isListOfPoints(marker) || marker.points.size > 0);
 }
 
 /// Empty: there is nothing to say.
@@ -94,9 +69,9 @@ MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)) {}
 
 DecodedMesh MeshDecoder::decode(const std::string& datatype, WireSpan<std::uint8_t> bytes, const TypedMesh& object) {
   const MeshType* type = findMeshType(datatype);
-  if (!type) refuse(meshTypeProblem(datatype, {}));
+  if (!type) refuseMessage(meshTypeProblem(datatype, {}));
   if (config_.type != "auto" && config_.type != type->name) {
-    refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
+    refuseMessage("type " + datatype + " arrives, but parameter type asks for " + config_.type);
   }
   try {
     WireReader wire(bytes.data, bytes.size);
@@ -104,21 +79,21 @@ DecodedMesh MeshDecoder::decode(const std::string& datatype, WireSpan<std::uint8
     const MeshView view =
         object.type ? type->view(object.message.get(), config_.noise_field) : type->read(wire, config_.noise_field);
     if (config_.source == TopologySource::DEPTH_IMAGE && !std::holds_alternative<CloudView>(view)) {
-      refuse("topology/source depth_image is for the points of a depth camera, and " + datatype + " arrives");
+      refuseMessage("topology/source depth_image is for the points of a depth camera, and " + datatype + " arrives");
     }
     return std::visit([this](const auto& mesh) { return decodeView(mesh); }, view);
   } catch (const WireError& error) {
-    refuse(datatype + ": " + error.what());
+    refuseMessage(datatype + ": " + error.what());
   } catch (const TopologyError& error) {
-    refuse(datatype + ": " + error.what());
+    refuseMessage(datatype + ": " + error.what());
   }
 }
 
 void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel) const {
   const bool from_field = !config_.noise_field.empty();
   if (from_field && !(cloud && cloud->extra)) {
-    refuse("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
-           "'; send a point cloud, or write uncertainty/radius_m");
+    refuseMessage("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
+                  "'; send a point cloud, or write uncertainty/radius_m");
   }
   if (!from_field && !(config_.noise_radius_m > 0)) return;
   mesh.radius_m.assign(mesh.positions.size(), config_.noise_radius_m);
@@ -132,32 +107,33 @@ void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std:
       std::ostringstream text;
       text << "field '" << config_.noise_field << "' of point " << point << " is " << value
            << "; an uncertainty is not negative, and at most " << MAX_NOISE_M << " m with its scale and radius_m";
-      refuse(text.str());
+      refuseMessage(text.str());
     }
   }
 }
 
 void MeshDecoder::checkCount(std::size_t count) const {
   if (count > config_.max_vertices) {
-    refuse(std::to_string(count) + " vertices are more than a mesh may have, " + std::to_string(config_.max_vertices));
+    refuseMessage(std::to_string(count) + " vertices are more than a mesh may have, " +
+                  std::to_string(config_.max_vertices));
   }
-  if (count == 0) refuse("there are no vertices");
+  if (count == 0) refuseMessage("there are no vertices");
 }
 
 void MeshDecoder::checkFaces(std::size_t count) const {
   if (count <= config_.max_faces) return;
-  refuse(std::to_string(count) + " triangles are more than the " + std::to_string(config_.max_faces) +
-         " for which there is room; raise max_memory_mb");
+  refuseMessage(std::to_string(count) + " triangles are more than the " + std::to_string(config_.max_faces) +
+                " for which there is room; raise max_memory_mb");
 }
 
 void MeshDecoder::start(const HeaderView& header, DecodedMesh& mesh) const {
   mesh.stamp_ns = header.stamp_ns;
   std::string_view name = header.frame_id.empty() ? std::string_view(config_.frame_id) : header.frame_id;
   if (!name.empty() && name[0] == '/') name.remove_prefix(1);  // tf2 has no leading slashes
-  if (name.empty()) refuse("the message names no frame; set parameter frame_id");
+  if (name.empty()) refuseMessage("the message names no frame; set parameter frame_id");
   mesh.frame_id = std::string(name.substr(0, MAX_NAME + 1));
   if (!frameNameProblem(mesh.frame_id).empty()) {  // too long, or one more slash
-    refuse("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
+    refuseMessage("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
   }
 }
 
@@ -207,7 +183,7 @@ void MeshDecoder::takePolylines(std::size_t length, DecodedMesh& mesh) {
   for (std::size_t begin = 0; begin < mesh.positions.size(); begin += length) {
     addLine(mesh.positions, begin, begin + length, edges);
   }
-  if (edges.empty()) refuse("there is nothing to check: all points of a line are one");
+  if (edges.empty()) refuseMessage("there is nothing to check: all points of a line are one");
   takeLines(edges, mesh);
 }
 
@@ -231,8 +207,8 @@ void MeshDecoder::takeFaces(Polygons sent, DecodedMesh& mesh) {
 
 DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   if (cloud.height < 2) {
-    refuse("topology/source depth_image needs an organised PointCloud2, and this one has " +
-           std::to_string(cloud.height) + " rows; subscribe to the camera's cloud before it is filtered");
+    refuseMessage("topology/source depth_image needs an organised PointCloud2, and this one has " +
+                  std::to_string(cloud.height) + " rows; subscribe to the camera's cloud before it is filtered");
   }
   DecodedMesh mesh;
   start(cloud.header, mesh);
@@ -244,7 +220,7 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   try {
     surface = depthSurface(cloud, config_.depth);
   } catch (const DepthSurfaceError& error) {
-    refuse(error.what());
+    refuseMessage(error.what());
   }
   mesh.topology = std::make_shared<const Topology>(Topology::fromTriangles(surface.positions.size(), surface.faces));
   mesh.positions = std::move(surface.positions);
@@ -270,11 +246,11 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   checkCount(cloud.size());
   const bool organised = cloud.height > 1;
   if (config_.source == TopologySource::MESSAGE || config_.source == TopologySource::FIRST_FRAME_WELD) {
-    refuse("a point cloud has no triangles; set topology/source to grid (with rows, cols), polyline or file");
+    refuseMessage("a point cloud has no triangles; set topology/source to grid (with rows, cols), polyline or file");
   }
   const bool is_rope = isRope(cloud);
   if (config_.source == TopologySource::AUTO && !is_rope && !organised && !config_.rows && !config_.cols) {
-    refuse(
+    refuseMessage(
         "an unorganised point cloud has no topology; set topology/rows and topology/cols for a grid, or "
         "topology/source to polyline or file");
   }
@@ -299,7 +275,7 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   checkCount(count);
   const bool carries_faces = view.triangles.size > 0 || !view.polygons.empty();
   if (config_.source == TopologySource::FIRST_FRAME_WELD) {
-    refuse("topology/source first_frame_weld is for triangle lists; this message has indices");
+    refuseMessage("topology/source first_frame_weld is for triangle lists; this message has indices");
   }
   mesh.positions.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -311,13 +287,13 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
     }
   }
   if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
-    if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
+    if (!carries_faces) refuseMessage("the message has no triangles; set topology/source to grid, polyline or file");
     checkFaces(faceCount(view));
     takeFaces(polygonsOf(view), mesh);
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
     // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as
     // long.
-    if (!known_.topology) refuse("the message has no triangles and no topology is known yet");
+    if (!known_.topology) refuseMessage("the message has no triangles and no topology is known yet");
     if (known_.topology->vertexCount() != count) {
       throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) +
                                                     " vertices without triangles, but the last topology has " +
@@ -333,133 +309,6 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   }
   if (view.cloud) mesh.row_step_hint = rowStepHint(*view.cloud);
   addRadii(view.cloud ? &*view.cloud : nullptr, mesh);
-  return mesh;
-}
-
-bool MeshDecoder::isWanted(const MarkerView& marker) const {
-  return (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
-         (!config_.marker_id || marker.id == *config_.marker_id) && marker.action == MARKER_ADD;
-}
-
-bool MeshDecoder::isReadable(const MarkerView& marker) const {
-  const bool is_polyline = config_.source == TopologySource::POLYLINE;
-  return marker.type == MARKER_TRIANGLE_LIST
-             ? !is_polyline
-             : isLineMarker(marker) || (isPointMarker(marker) && (is_polyline || hasFixedTopology()));
-}
-
-bool MeshDecoder::passesOver(const std::vector<MarkerView>& markers) const {
-  const auto none = [&](auto is) { return !markers.empty() && std::none_of(markers.begin(), markers.end(), is); };
-  if (none([](const MarkerView& one) { return one.action == MARKER_ADD; })) return true;
-  const bool is_named = config_.marker_namespace || config_.marker_id;
-  if (is_named && none([&](const MarkerView& one) { return isWanted(one); })) return true;
-  return none([&](const MarkerView& one) { return isWanted(one) && (isReadable(one) || !names_.isOther(one)); });
-}
-
-DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
-  std::string seen;
-  std::vector<const MarkerView*> lists, lines, points;
-  for (const MarkerView& marker : markers) {
-    const bool wanted = isWanted(marker);
-    if (wanted && marker.type == MARKER_TRIANGLE_LIST && config_.source != TopologySource::POLYLINE) {
-      lists.push_back(&marker);
-    } else if (wanted && isLineMarker(marker) && marker.points.size > 0) {
-      lines.push_back(&marker);
-    } else if (wanted && isPointMarker(marker) && marker.points.size > 0) {
-      points.push_back(&marker);
-    } else if (seen.size() < 200) {
-      seen += " ('" + std::string(marker.ns.substr(0, 32)) + "', " + std::to_string(marker.id) + ", type " +
-              std::to_string(marker.type) + (marker.points.size == 0 ? " without points)" : ")");
-    }
-  }
-  const std::vector<const MarkerView*>& taken = !lists.empty() ? lists : !lines.empty() ? lines : points;
-  const bool passed_over = passesOver(markers);
-  if (taken.empty() || passed_over) {
-    const std::string text =
-        "no " + std::string(config_.source == TopologySource::POLYLINE ? "" : "TRIANGLE_LIST marker and no ") +
-        "LINE_STRIP, LINE_LIST or POINTS with the wanted namespace and id; there are (namespace, id, type):" +
-        (seen.empty() ? " none" : seen);
-    if (passed_over) throw PassedOver(text, std::any_of(markers.begin(), markers.end(), mayBeThing));
-    refuse(text);
-  }
-  if (&taken == &points && config_.source != TopologySource::POLYLINE && !hasFixedTopology()) {
-    refuse("marker " + nameOf(*points[0]) +
-           " has points without a topology; set topology/source to polyline or file, or topology/rows and "
-           "topology/cols for a grid");
-  }
-  names_.require(taken);
-  DecodedMesh mesh = &taken == &lists ? decodeSoup(*lists[0]) : decodeRopes(taken);
-  names_.keep(taken);
-  if (&taken == &lists) lists.resize(1);
-  tellUnread(markers, taken, mesh);
-  return mesh;
-}
-
-/// Lines and points that lie just where the mesh has vertices are drawn of it, and arrows and texts are no things. All
-/// else may be one that the mesh is not, and nobody looks at it.
-void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::vector<const MarkerView*>& taken,
-                             DecodedMesh& mesh) const {
-  std::set<std::array<double, 3>> places;
-  const auto isVertex = [&](const Vec3& p) { return !p.allFinite() || places.count({p.x(), p.y(), p.z()}) > 0; };
-  const auto isDrawnOfIt = [&](const MarkerView& marker) {
-    if (!isLineMarker(marker) && !isPointMarker(marker)) return false;
-    if (marker.header.frame_id != taken.front()->header.frame_id) return false;
-    if (places.empty()) {
-      for (const Vec3& p : mesh.positions) places.insert({p.x(), p.y(), p.z()});
-    }
-    const Eigen::Affine3d pose = poseOf(marker);
-    for (std::size_t i = 0; i < marker.points.size; ++i) {
-      const auto p = marker.points[i];
-      if (!isVertex(pose * Vec3(p[0], p[1], p[2]))) return false;
-    }
-    return true;
-  };
-  for (const MarkerView& marker : markers) {
-    const bool by_choice = config_.source == TopologySource::POLYLINE && marker.type == MARKER_TRIANGLE_LIST;
-    const bool is_taken = std::find(taken.begin(), taken.end(), &marker) != taken.end();
-    if (!isWanted(marker) || !mayBeThing(marker) || by_choice || is_taken || isDrawnOfIt(marker)) continue;
-    if (mesh.unread_markers++ == 0) mesh.unread_marker = nameOf(marker) + ", type " + std::to_string(marker.type);
-    mesh.dropped_faces += marker.type == MARKER_TRIANGLE_LIST ? (marker.points.size + 2) / 3
-                                                              : std::max<std::size_t>(marker.points.size, 1);
-  }
-}
-
-DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
-  DecodedMesh mesh;
-  start(marker.header, mesh);
-  const std::size_t count = marker.points.size;
-  checkCount(count);
-  checkFaces(count / 3);
-  if (count % 3 != 0) refuse("a TRIANGLE_LIST of " + std::to_string(count) + " points, which is not a multiple of 3");
-  const Eigen::Affine3d transform = poseAndScaleOf(marker);
-  Positions corners(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto p = marker.points[i];
-    corners[i] = Vec3(p[0], p[1], p[2]);
-  }
-  if (!known_ropes_.empty()) forgetJoints();  // they are of their ends
-  const bool welds_anew = weld_.vertexOfCorner().size() != count;
-  if (config_.weld && config_.source != TopologySource::FILE) {
-    mesh.weld_changes = weld_.weld(corners);
-  } else {
-    weld_.keepApart(count);
-  }
-  mesh.positions.reserve(weld_.cornerOfVertex().size());
-  for (const Index corner : weld_.cornerOfVertex()) mesh.positions.push_back(transform * corners[corner]);
-  if (config_.source == TopologySource::FILE) {
-    takeFixed(count, 0, 0, mesh);
-  } else {
-    try {
-      Polygons sent{weld_.vertexOfCorner(), {}};
-      sent.ends.reserve(count / 3);
-      for (std::size_t end = 3; end <= count; end += 3) sent.ends.push_back(end);
-      takeFaces(std::move(sent), mesh);
-    } catch (...) {
-      if (welds_anew) weld_.forget();  // a soup that is refused does not say which corners of the next one are one
-      throw;
-    }
-  }
-  addRadii(nullptr, mesh);
   return mesh;
 }
 

@@ -48,6 +48,8 @@ struct MeshError : std::runtime_error {
   StepStatus status;
 };
 
+[[noreturn]] inline void refuseMessage(const std::string& text) { throw MeshError(StepStatus::BAD_MESSAGE, text); }
+
 /// A message of markers that are none of the mesh, by their names or because they only take others away: no frame, and
 /// none is missing.
 struct PassedOver : MeshError {

@@ -88,6 +88,7 @@ TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped&
 void TransformFeed::forget(Frame& frame) {
   kept_count_ -= frame.sent.size();
   frame.sent.clear();
+  frame.lead = {};
   frame.is_cut = frame.is_apart = has_apart_ = true;
 }
 
@@ -130,6 +131,7 @@ void TransformFeed::clear() {
   for (auto& named : frames_) {
     named.second.sent.clear();
     named.second.newest.clear();
+    named.second.lead = {};
     named.second.is_cut = named.second.is_apart = named.second.passed_over = false;
   }
   kept_count_ = 0;

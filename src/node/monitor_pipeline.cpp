@@ -258,6 +258,7 @@ void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   promises_.forget(why);
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
+  for (Source& source : sources_) source.lead = {};
   learnAnew(status);
 }
 

@@ -113,7 +113,7 @@ struct Monitor::Impl {
   void lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const;
   /// The same of what is held where it was placed once: static bodies and the map. epoch: of the step's first frame.
   void lookAtHeld(std::uint64_t epoch, Shown& shown, Step& step) const;
-  void lookAtHeld(std::size_t body, std::uint64_t epoch, Step& step) const;
+  bool lookAtHeld(std::size_t body, std::uint64_t epoch, Step& step) const;
   void sayUnshown(const Shown& shown, Step& step) const;
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();

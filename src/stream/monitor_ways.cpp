@@ -225,9 +225,8 @@ void Monitor::Impl::lookForUnused(std::size_t body, StampNs from_ns, StampNs to_
 
 void Monitor::Impl::lookAtHeld(std::uint64_t epoch, Shown& shown, Step& step) const {
   for (std::size_t b = 0; b <= bodies.size(); ++b) {
-    const bool is_map = b == bodies.size();
-    if (is_map ? step.map.surface != nullptr : !isStream(b)) lookAtHeld(b, epoch, step);
-    shown[b] = shown[b] || is_map || !isStream(b);
+    const bool is_held = b == bodies.size() || !isStream(b);
+    if (is_held) shown[b] = lookAtHeld(b, epoch, step);
   }
 }
 
@@ -239,8 +238,9 @@ void Monitor::Impl::sayUnshown(const Shown& shown, Step& step) const {
 }
 
 /// What tf says since it was placed must not be contradicted in silence. body: their number stands for the map.
-void Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) const {
+bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) const {
   const bool is_map = b == bodies.size();
+  if (is_map && !step.map.surface) return true;
   const MeshFrame* const frame = is_map ? nullptr : &stores[b].newest();
   const std::string& carrier = is_map ? step.map.frame_id : frame->carrier.frame;
   const auto name = [&] {  // most of the time nobody asks
@@ -248,13 +248,13 @@ void Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
   };
   const auto say = [&](const std::string& why) { sayUnknown(name(), why, step); };
   if (frame && !frame->doubt.empty()) say(frame->doubt);
-  if (!tracks || carrier.empty()) return;
+  if (!tracks || carrier.empty()) return true;
   const std::vector<Knot> knots =
       is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)
              : tracks->between({}, carrier, step.start_ns, step.stamp_ns, frame->carrier.silence);
   if (!knots.empty() && epoch != tracks->epoch()) {
     say(FORGOTTEN);
-    return;
+    return true;
   }
   const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : frame->pose;
   double off_m = 0;
@@ -269,11 +269,12 @@ void Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
     off_m = std::max(off_m, is_map ? apart(knot.pose, held, bounds)
                                    : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
   }
-  if (off_m <= options.detector.rigid_tolerance_m) return;
+  if (off_m <= options.detector.rigid_tolerance_m) return true;
   std::ostringstream text;
   text << name() << " was seen up to " << off_m << " m from where it was at its stamp; "
        << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
   addSentence(step.off_path, text.str());
+  return true;
 }
 
 }  // namespace dccd
