@@ -4,7 +4,7 @@
 file(GLOB HOT_SOURCES CONFIGURE_DEPENDS
   src/culling/*.cpp src/simd/*.cpp src/elementary/*.cpp src/obstacle/*.cpp src/step/pairs/*.cpp src/step/start/*.cpp
   src/step/patches/*.cpp)
-file(GLOB COLD_SOURCES CONFIGURE_DEPENDS src/step/*.cpp src/step/clearance/*.cpp src/stream/*.cpp src/record/*.cpp)
+file(GLOB COLD_SOURCES CONFIGURE_DEPENDS src/proof/*.cpp src/step/*.cpp src/step/clearance/*.cpp src/stream/*.cpp src/record/*.cpp)
 file(STRINGS include/dccd/export.h API_VERSION_LINE REGEX "define DCCD_API_VERSION [0-9]+")
 string(REGEX MATCH "[0-9]+" API_VERSION "${API_VERSION_LINE}")
 

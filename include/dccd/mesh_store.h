@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -94,6 +95,8 @@ class DCCD_EXPORT MeshStore {
 
   /// OK: continues the frame before. A seam: kept, and begins a new run. DUPLICATE, VERTEX_COUNT: not kept.
   StepStatus push(MeshFrame frame);
+  /// This store, still empty, takes the place of another one: the next frame is late where it would be so there.
+  void replace(const MeshStore& before, StampNs next_ns);
   /// Frames came that will not be pushed. Said of them, where they are missed.
   void passOver(std::uint64_t count, std::string why);
 
@@ -148,14 +151,17 @@ class DCCD_EXPORT MeshStore {
     std::string unknown;       // why the way from the frame before, of the same run, is not known; empty: it is
   };
   MeshStoreOptions options_;
+  static constexpr StampNs NEVER_NS = std::numeric_limits<StampNs>::min();
   std::deque<Kept> frames_;
   std::uint64_t run_ = 0;
   StepStatus run_reason_ = StepStatus::FIRST_FRAME;
-  std::size_t vertices_ = 0;  ///< in all frames kept
-  std::uint64_t came_ = 0;    ///< number of the last frame that came
-  std::string why_;           ///< why it is not here; empty: it is, or nobody said so
+  std::size_t vertices_ = 0;          ///< in all frames kept
+  std::uint64_t came_ = 0;            ///< number of the last frame that came
+  std::string why_;                   ///< why it is not here; empty: it is, or nobody said so
+  StampNs seen_until_ns_ = NEVER_NS;  ///< frames came up to then that are here no more, for stamps went back a little
 
   StepStatus classify(const MeshFrame& frame) const;
+  StampNs lateAfter(StampNs stamp_ns) const;
   void forgetOldest();
   std::size_t firstAtOrAfter(StampNs stamp_ns) const;
   void comesAgain(const MeshFrame& frame);

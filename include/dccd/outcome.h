@@ -178,6 +178,28 @@ struct LeftOutPair {
   std::array<Index, 4> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< as in Contact
 };
 
+/// What nobody looked at in a part of a step.
+struct Gap {
+  std::array<std::uint16_t, 2> body{0, 0};  ///< which partners may touch; OBSTACLE_BODY: the map
+  bool at_start = false;                    ///< or, of any of them, whether they cross when it begins
+  double from = 0, to = 1;                  ///< [1] of the step
+};
+
+/// Whether all that is asked of a step was looked at. Nothing is, until it is said of each part.
+class Claim {
+ public:
+  /// Parts follow each other. Of more gaps than a few the first are kept.
+  DCCD_EXPORT void add(std::size_t part, std::size_t parts, const std::vector<Gap>& gaps);
+  bool holds() const { return parts_ > 0 && covered_ == parts_ && gaps_.empty(); }
+  const std::vector<Gap>& gaps() const { return gaps_; }
+  /// Why it does not hold, a sentence each; a body's name by its number.
+  DCCD_EXPORT std::vector<std::string> inWords(const std::vector<std::string>& names) const;
+
+ private:
+  std::size_t covered_ = 0, parts_ = 0;
+  std::vector<Gap> gaps_;
+};
+
 /// Of how many contacts what holds.
 struct ContactCounts {
   std::size_t certain = 0, undecided = 0;
@@ -193,7 +215,7 @@ struct Findings {
   std::vector<Contact> contacts;  ///< in canonical order
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;  ///< of edges through faces one at the most with earliest_only
-  bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
+  bool start_state_complete = false;             ///< all that can meet at t0 was looked at, or nobody asked for it
   /// False: the step budget ran out, or max_found was reached, before the last pair or, of a whole step, before the
   /// start state was known.
   bool complete = true;
@@ -226,6 +248,7 @@ struct Outcome : Findings {
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
   std::size_t substeps = 0;                                                  ///< parts that the step was cut into
   Touching touching = Touching::NONE;  ///< as if no patches were tracked; Assurance::touching holds
+  Claim claim;                         ///< that all of the step was looked at: else nothing is proved
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
   std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not
   std::vector<std::string> excluded;  ///< what was left out by choice

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -111,6 +112,8 @@ class DCCD_EXPORT Monitor {
   void setTracks(const FrameTracks* tracks);
   /// Of such frames those of which a step needs to know: of the map in use, of maps that wait, of static bodies.
   std::set<std::string> heldFrames() const;
+  /// ObstacleMap::arrival_ns of the first of the maps that wait for the bodies' frames; none: none does.
+  std::optional<std::int64_t> mapWaitsSince() const;
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
   bool next(std::int64_t now_ns, Outcome& outcome);

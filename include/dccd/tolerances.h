@@ -34,6 +34,10 @@ constexpr double RIGID_PATH_M = 1e-3;
 constexpr double SAME_PLACE = 1e-6;
 /// [s] A longer pause between two frames is a gap: what moved in it is not known to be straight.
 constexpr double LONGEST_STEP_S = 0.5;
+/// [s] A frame whose stamp is before the last one's by no more than this is late, and what came before it lies beside
+/// its way. Larger: after a time that begins anew steps are not proved for longer. Smaller: a late frame may be taken
+/// for one of a time that begins anew.
+constexpr double LATE_FRAME_S = 1;
 /// [m] A vertex that moves further in a step is a teleport, no motion: trackers lose a mesh and find it elsewhere.
 constexpr double FARTHEST_VERTEX_STEP_M = 0.5;
 /// [s] A contact that is let go for less is the same one when it comes back. Larger: noise lets go less often, ends are

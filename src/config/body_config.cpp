@@ -113,6 +113,7 @@ void readSource(ParameterReader& reader, const std::string& default_topic, BodyC
     marker.finish();
   }
   body.body.motion = choiceOf(reader, "motion", BodyMotionKind::STREAM, {"stream", "static"});
+  body.input.is_static = body.body.motion == BodyMotionKind::STATIC;
   body.body.vertex_mask = reader.indices("vertex_mask");
   if (body.isDepthImage()) {
     // No vertex of one cloud is a vertex of the next, so there is no path between two, nor a number to mask.

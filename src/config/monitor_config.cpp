@@ -177,6 +177,10 @@ std::vector<std::string> beyondLimits(const MonitorConfig& config) {
     const std::string what = "what the picture of body '" + body.body.name + "' shows ";
     if (depth.max_range_m > 0) add(what + "farther than ", depth.max_range_m, "topology/max_range_m");
     if (depth.min_range_m > plain.min_range_m) add(what + "nearer than ", depth.min_range_m, "topology/min_range_m");
+    std::ostringstream text;
+    text << what << "in points that have no neighbours within topology/max_edge_m, " << depth.max_edge_m << " m";
+    if (depth.stride > 1) text << ", and between each pixel and the next one by topology/stride, " << depth.stride;
+    sentences.push_back(text.str());
   }
   return sentences;
 }

@@ -56,6 +56,7 @@ bool MeshDecoder::passesOver(const std::vector<MarkerView>& markers) const {
 }
 
 DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
+  shown_.remove(markers);
   std::string seen;
   std::vector<const MarkerView*> lists, lines, points;
   for (const MarkerView& marker : markers) {
@@ -95,9 +96,9 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
 }
 
 /// Lines and points that lie just where the mesh has vertices are drawn of it, and arrows and texts are no things. All
-/// else may be one that the mesh is not, and nobody looks at it.
+/// else may be one that the mesh is not, and nobody looks at it; so may what came before and is shown still.
 void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::vector<const MarkerView*>& taken,
-                             DecodedMesh& mesh) const {
+                             DecodedMesh& mesh) {
   std::set<std::array<double, 3>> places;
   const auto isVertex = [&](const Vec3& p) { return !p.allFinite() || places.count({p.x(), p.y(), p.z()}) > 0; };
   const auto isDrawnOfIt = [&](const MarkerView& marker) {
@@ -113,14 +114,22 @@ void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::
     }
     return true;
   };
+  const auto tell = [&](const std::string& what, std::size_t faces) {
+    if (mesh.unread_markers++ == 0) mesh.unread_marker = what;
+    mesh.dropped_faces += faces;
+  };
+  std::vector<const MarkerView*> things = taken;
   for (const MarkerView& marker : markers) {
     const bool by_choice = config_.source == TopologySource::POLYLINE && marker.type == MARKER_TRIANGLE_LIST;
     const bool is_taken = std::find(taken.begin(), taken.end(), &marker) != taken.end();
+    mesh.has_others = mesh.has_others || (!isWanted(marker) && mayBeThing(marker));
     if (!isWanted(marker) || !mayBeThing(marker) || by_choice || is_taken || isDrawnOfIt(marker)) continue;
-    if (mesh.unread_markers++ == 0) mesh.unread_marker = nameOf(marker) + ", type " + std::to_string(marker.type);
-    mesh.dropped_faces += marker.type == MARKER_TRIANGLE_LIST ? (marker.points.size + 2) / 3
-                                                              : std::max<std::size_t>(marker.points.size, 1);
+    things.push_back(&marker);
+    tell(nameOf(marker) + ", type " + std::to_string(marker.type), marker.type == MARKER_TRIANGLE_LIST
+                                                                       ? (marker.points.size + 2) / 3
+                                                                       : std::max<std::size_t>(marker.points.size, 1));
   }
+  for (const std::string& name : shown_.show(things)) tell(name + ", which came before and was not deleted", 1);
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {

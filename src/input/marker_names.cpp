@@ -1,13 +1,15 @@
 #include "input/marker_names.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
 #include "input/short_text.h"
 
 namespace dccd {
 namespace {
 
-constexpr std::size_t MOST_IDS = 64;  // that are remembered
+constexpr std::size_t MOST_IDS = 64, MOST_SHOWN = 1024;  // that are remembered
 
 /// A name may be as long as a message; its beginning tells markers apart.
 std::string namespaceOf(const MarkerView& marker) { return std::string(marker.ns.substr(0, MAX_NAME)); }
@@ -52,6 +54,51 @@ void MarkerNames::keep(const std::vector<const MarkerView*>& taken) {
   if (ids_before_.size() > MOST_IDS) ids_before_.pop_front();
   is_alone_ = taken[0]->is_message;
   id_ = taken[0]->id;
+}
+
+bool ShownMarkers::Shown::isNamedAs(const MarkerView& marker) const {
+  return id == marker.id && ns == namespaceOf(marker);
+}
+
+void ShownMarkers::remove(const std::vector<MarkerView>& markers) {
+  for (const MarkerView& marker : markers) {
+    if (marker.action == MARKER_DELETE_ALL) shown_.clear();
+    if (marker.action != MARKER_DELETE) continue;
+    shown_.erase(std::remove_if(shown_.begin(), shown_.end(), [&](const Shown& one) { return one.isNamedAs(marker); }),
+                 shown_.end());
+  }
+}
+
+std::vector<std::string> ShownMarkers::show(const std::vector<const MarkerView*>& markers) {
+  if (markers.empty()) return {};
+  const StampNs now_ns = markers[0]->header.stamp_ns;
+  std::size_t stay = 0, before = 0;
+  for (std::size_t i = 0; i < shown_.size();) {
+    const Shown& one = shown_[i];
+    const bool stays =
+        std::any_of(markers.begin(), markers.end(), [&](const MarkerView* marker) { return one.isNamedAs(*marker); });
+    stay += stays;
+    before += !one.is_renamed;
+    if (stays || one.until_ns < now_ns) {
+      shown_.erase(shown_.begin() + static_cast<std::ptrdiff_t>(i));
+    } else {
+      ++i;
+    }
+  }
+  const bool all_are_renamed = may_rename_ && stay == 0 && before == markers.size();
+  const bool is_known_to_rename = std::exchange(renames_, all_are_renamed) && all_are_renamed;
+  std::vector<std::string> left;
+  for (Shown& one : shown_) {
+    one.is_renamed = all_are_renamed;
+    if (!is_known_to_rename) left.push_back(nameOf(one.ns, one.id));
+  }
+  for (const MarkerView* marker : markers) {
+    const StampNs until_ns =
+        marker->lifetime_ns > 0 ? marker->header.stamp_ns + marker->lifetime_ns : std::numeric_limits<StampNs>::max();
+    shown_.push_back({namespaceOf(*marker), marker->id, until_ns, false});
+  }
+  while (shown_.size() > MOST_SHOWN + markers.size()) shown_.pop_front();
+  return left;
 }
 
 }  // namespace dccd

@@ -39,4 +39,31 @@ class MarkerNames {
   bool has(const MarkerView& marker) const;
 };
 
+/// Markers that came before: each is shown until it is deleted, replaced by its name, or its lifetime is over.
+class ShownMarkers {
+ public:
+  /// A stream may give all of its markers other names each time, and then it shows what it names last. That is believed
+  /// from the second time on.
+  explicit ShownMarkers(bool may_rename) : may_rename_(may_rename) {}
+  /// What the message takes away.
+  void remove(const std::vector<MarkerView>& markers);
+  /// The message shows these. Returns the names of those that came before and are shown still.
+  std::vector<std::string> show(const std::vector<const MarkerView*>& markers);
+  void forget() {
+    shown_.clear();
+    renames_ = false;
+  }
+
+ private:
+  struct Shown {
+    std::string ns;
+    std::int32_t id;
+    StampNs until_ns;
+    bool is_renamed;  ///< what came after it bore other names alone
+    bool isNamedAs(const MarkerView& marker) const;
+  };
+  bool may_rename_, renames_ = false;
+  std::deque<Shown> shown_;
+};
+
 }  // namespace dccd

@@ -65,7 +65,7 @@ std::string rowStepHint(const CloudView& cloud) {
 
 }  // namespace
 
-MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)) {}
+MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)), shown_(!config_.is_static) {}
 
 DecodedMesh MeshDecoder::decode(const std::string& datatype, WireSpan<std::uint8_t> bytes, const TypedMesh& object) {
   const MeshType* type = findMeshType(datatype);
@@ -78,6 +78,10 @@ DecodedMesh MeshDecoder::decode(const std::string& datatype, WireSpan<std::uint8
     wire.limitEntries(config_.max_faces);
     const MeshView view =
         object.type ? type->view(object.message.get(), config_.noise_field) : type->read(wire, config_.noise_field);
+    if (wire.left() > 0 && !object.type) {
+      refuseMessage(std::to_string(wire.left()) + " bytes stand after a message of type " + datatype +
+                    ": it is of another one");
+    }
     if (config_.source == TopologySource::DEPTH_IMAGE && !std::holds_alternative<CloudView>(view)) {
       refuseMessage("topology/source depth_image is for the points of a depth camera, and " + datatype + " arrives");
     }
@@ -270,6 +274,12 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
 
 DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   DecodedMesh mesh;
+  if (view.header && view.cloud && !view.header->frame_id.empty() && !view.cloud->header.frame_id.empty() &&
+      view.header->frame_id != view.cloud->header.frame_id) {
+    refuseMessage("header.frame_id is '" + shortText(view.header->frame_id, MAX_NAME) +
+                  "', and cloud.header.frame_id '" + shortText(view.cloud->header.frame_id, MAX_NAME) +
+                  "': name one frame");
+  }
   start(view.header ? *view.header : HeaderView{}, mesh);
   const std::size_t count = view.size();
   checkCount(count);

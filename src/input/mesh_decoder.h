@@ -40,6 +40,7 @@ struct MeshInputConfig {
   /// named.
   std::string noise_field;
   double noise_scale = 1, noise_radius_m = 0;
+  bool is_static = false;  ///< its newest frame holds at all times
 };
 
 /// Why a message is refused; BAD_MESSAGE or VERTEX_COUNT. The text names the field and the value.
@@ -62,8 +63,9 @@ struct PassedOver : MeshError {
 struct DecodedMesh : MeshFrame {
   std::string frame_id;
   std::size_t weld_changes = 0;    ///< welded vertices whose corners came apart
-  std::size_t unread_markers = 0;  ///< beside those that were taken, and not drawn of these: unchecked
-  std::string unread_marker;       ///< the first of them: its name and type
+  std::size_t unread_markers = 0;  ///< that are shown beside those that were taken, and not drawn of these: unchecked
+  std::string unread_marker;       ///< the first of them: its name, and what it is
+  bool has_others = false;         ///< beside it came what may be things, by names that are not the wanted ones
   std::size_t no_measurement = 0;  ///< pixels of a depth image that are none
   std::string camera_hint;    ///< that it looks like a depth camera's picture, taken for a grid; empty: it does not
   std::string row_step_hint;  ///< what a cloud says that its data contradict; empty: nothing
@@ -82,6 +84,7 @@ class MeshDecoder {
   void forgetWeld() {
     forgetJoints();
     names_.forget();
+    shown_.forget();
   }
 
  private:
@@ -97,6 +100,7 @@ class MeshDecoder {
   SoupWeld weld_;                      // of a triangle soup's corners, or of the ends of lines
   std::vector<RopeName> known_ropes_;  // of the last markers that were read
   MarkerNames names_;
+  ShownMarkers shown_;
 
   void forgetJoints() {
     weld_.forget();
@@ -116,7 +120,7 @@ class MeshDecoder {
   bool isReadable(const MarkerView& marker) const;
   /// Names and counts the markers that may be things of their own.
   void tellUnread(const std::vector<MarkerView>& markers, const std::vector<const MarkerView*>& taken,
-                  DecodedMesh& mesh) const;
+                  DecodedMesh& mesh);
   /// Nothing of the message is the mesh, and the mesh is elsewhere: by the names of its markers.
   bool passesOver(const std::vector<MarkerView>& markers) const;
   void checkFaces(std::size_t count) const;

@@ -23,6 +23,7 @@ struct MeshMessage {
   std::uint64_t number = 0;    ///< in the order in which the topic's came, with those that were lost; 0: after the last
   std::uint64_t thinned = 0;   ///< before it, that a queue left out by choice
   std::int64_t since_ns = -1;  ///< arrival on the clock that drives the pipeline; negative: arrival_ns
+  std::string sender = {};     ///< the publisher's name; empty: it is not known
 
   std::size_t size() const { return object.type ? object.type->size(object.message.get()) : bytes.size(); }
 };

@@ -97,6 +97,7 @@ void MeshSubscription::onBytes(const ros::MessageEvent<const ShapeShifter>& even
   MeshMessage message;
   message.number = ++*came_;
   on_number_(message.number);
+  message.sender = event.getPublisherName();
   const ShapeShifter::ConstPtr bytes = event.getConstMessage();
   message.datatype = bytes->getDataType();
   heard(message.datatype);

@@ -93,11 +93,12 @@ struct MarkerView {
   bool is_message = false;       ///< of its own; else it came in an array, which is one
   std::array<double, 7> pose{};  ///< position x y z, quaternion x y z w
   std::array<double, 3> scale{};
+  StampNs lifetime_ns = 0;  ///< how long it is shown; 0: until it is deleted
   WireSpan<PointOnWire> points;
 };
 constexpr std::int32_t MARKER_ARROW = 0, MARKER_LINE_STRIP = 4, MARKER_LINE_LIST = 5, MARKER_CUBE_LIST = 6,
                        MARKER_SPHERE_LIST = 7, MARKER_POINTS = 8, MARKER_TEXT = 9, MARKER_TRIANGLE_LIST = 11;
-constexpr std::int32_t MARKER_ADD = 0;
+constexpr std::int32_t MARKER_ADD = 0, MARKER_DELETE = 2, MARKER_DELETE_ALL = 3;
 
 using MeshView = std::variant<CloudView, IndexedView, std::vector<MarkerView>>;
 

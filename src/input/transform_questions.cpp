@@ -15,6 +15,9 @@ namespace {
 
 // tf2 follows no longer chain.
 constexpr std::size_t MAX_CHAIN = 1000;
+// Between two transforms that are further apart a frame may have gone anywhere. Frames that move slowly come once a
+// second.
+constexpr StampNs LONGEST_HOLE_NS = 2'000'000'000;
 
 ros::Time toTime(StampNs stamp_ns) {
   ros::Time time;
@@ -220,11 +223,14 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
       const Frame *const parent = parentAt(frame, end_ns), *before = nullptr;
       StampNs since_ns = from_ns;
       auto one = after(frame, end_ns);
-      bool has_gap =
-          one != frame.sent.end() && one != frame.sent.begin() && one->second.gap && std::prev(one)->first < end_ns;
+      const auto followsGap = [&](auto sample) {
+        return sample != frame.sent.begin() &&
+               (sample->second.gap || sample->first - std::prev(sample)->first > LONGEST_HOLE_NS);
+      };
+      bool has_gap = one != frame.sent.end() && followsGap(one) && std::prev(one)->first < end_ns;
       while (one != frame.sent.begin()) {
         --one;
-        has_gap = has_gap || (one->second.gap && one->first > from_ns && one != frame.sent.begin());
+        has_gap = has_gap || (one->first > from_ns && followsGap(one));
         before = one->second.parent;
         if (before != parent) break;
         since_ns = one->first;

@@ -19,9 +19,10 @@ Knot unknownAt(StampNs stamp_ns, std::string why) { return {stamp_ns, Eigen::Iso
 Knot unknownBefore(const TransformFeed::NewParent& change) {
   const std::string name = "'" + shortText(*change.frame, MAX_NAME) + "'";
   if (!change.now) {
-    return unknownAt(change.stamp_ns - 1, "a transform of frame " + name +
-                                              " came that cannot be used, or that has it elsewhere at a stamp that it "
-                                              "had already");
+    return unknownAt(change.stamp_ns - 1,
+                     "a transform of frame " + name +
+                         " came that cannot be used, or that has it elsewhere at a stamp that it had already, or none "
+                         "came for more than 2 s");
   }
   if (!change.before) {
     return unknownAt(change.stamp_ns - 1,

@@ -105,6 +105,15 @@ void TransformFeed::forgetAllOf(const std::string& sender) {
   }
 }
 
+void TransformFeed::beginAnew(StampNs stamp_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool any_ahead = std::any_of(frames_.begin(), frames_.end(), [&](const auto& named) {
+    const Frame& frame = named.second;
+    return !frame.sent.empty() && frame.sent.rbegin()->first > stamp_ns + JUMP_BACK_NS;
+  });
+  if (any_ahead) clear();
+}
+
 /// Else it is kept, and those are forgotten that the buffer forgets with it.
 bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame) {
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());

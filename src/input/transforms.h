@@ -82,6 +82,9 @@ class TransformFeed {
   };
   std::optional<Ahead> mostAhead(const std::string& target, const std::string& source) const;
 
+  /// Time begins anew at this stamp. If a frame has been sent for a time well after it, what was sent before is
+  /// forgotten of all that move: each comes again.
+  void beginAnew(StampNs stamp_ns);
   /// How often where frames were before was forgotten.
   std::uint64_t timesForgotten() const { return times_forgotten_; }
   /// How many transforms could not be used.

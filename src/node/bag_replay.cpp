@@ -31,7 +31,8 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
   LoadedMap map;
   map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
   if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory);
-  if (map.stamp_ns == 0) map.stamp_ns = receiptOf(message);
+  map.receipt_ns = receiptOf(message);
+  if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
   return map;
 }
 
@@ -207,8 +208,14 @@ struct BagReplay::Run {
     ++summary.mesh_messages;
     drain(at);  // what waited for other bodies until now gives up first
     const bool is_known = meshTypeProblem(message.getDataType(), message.getMD5Sum()).empty();
-    pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns, message.getMD5Sum(),
-                         is_known ? "" : message.getMessageDefinition()});
+    MeshMessage one{message.getDataType(),
+                    std::move(bytes),
+                    now_ns,
+                    now_ns,
+                    message.getMD5Sum(),
+                    is_known ? "" : message.getMessageDefinition()};
+    one.sender = message.getCallerId();
+    pipeline.take(body, one);
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(at);
   }

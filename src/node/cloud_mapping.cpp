@@ -224,6 +224,11 @@ SensorView CloudMapping::read(const CloudMessage& message, Reading& reading) {
     throw WireError("frame_id '" + frame + "' is one more than " + std::to_string(MOST_VIEWS) + " of all clouds");
   }
   reading.view = std::move(view);
+  const auto known = views_.find(reading.view);
+  const double late_s = known == views_.end() ? 0 : secondsBetween(reading.map.stamp_ns, known->second.stamp_ns);
+  if (late_s > 0 && late_s <= tolerance::LATE_FRAME_S) {
+    throw WireError("it is stamped " + std::to_string(late_s) + " s before one from there that is in the map");
+  }
   return isDepthPicture(message.datatype) ? readPicture(message, reading) : readCloudOf(message, reading);
 }
 
@@ -310,7 +315,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
   const std::int64_t start_ns = steadyNs();
   LoadedMap map;
   map.frame_id = frame_;
-  map.stamp_ns = message.receipt_ns;
+  map.stamp_ns = map.receipt_ns = message.receipt_ns;
   Reading reading{map, {message.source, {}}, may_wait};
   bool is_seen = false;
   forgetRefused(message.receipt_ns);
@@ -320,7 +325,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
     seen.clears = !(message.is_behind && known != views_.end() && known->second.fills_next);
     insert(seen, reading);
     views_.erase({message.source, {}});
-    views_[reading.view] = {{}, true, message.receipt_ns, seen.clears};
+    views_[reading.view] = {{}, true, message.receipt_ns, map.stamp_ns, seen.clears};
     if (!seen.clears) ++only_filled_;
     is_seen = true;
     checkOthers(reading.view, message.receipt_ns);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -70,9 +71,10 @@ class CloudMapping {
   /// One sensor, as far as anybody can tell: the topic's number and the frame_id.
   using ViewName = std::pair<std::size_t, std::string>;
   struct View {
-    std::string problem;      // why its newest cloud is not in the map; empty: it is
-    bool is_known = false;    // one of them was
-    StampNs receipt_ns = 0;   // of the newest one
+    std::string problem;                                     // why its newest cloud is not in the map; empty: it is
+    bool is_known = false;                                   // one of them was
+    StampNs receipt_ns = 0;                                  // of the newest one
+    StampNs stamp_ns = std::numeric_limits<StampNs>::min();  // of the last one that is in the map
     bool fills_next = false;  // the last one cleared, and the next is to do without if time is short
   };
   const MonitorConfig& config_;

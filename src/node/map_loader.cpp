@@ -169,7 +169,8 @@ void MapLoader::loop() {
     }
     LoadedMap map = load(job);
     map.arrival_ns = job.settles_ns;
-    if (map.stamp_ns == 0) map.stamp_ns = job.message.receipt_ns;
+    map.receipt_ns = job.message.receipt_ns;
+    if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
     if (!config_.takesClouds()) map.number = job.number;
     if (!map.surface) ++refused_;
     if (map.surface || !config_.takesClouds()) last_ = map.surface;

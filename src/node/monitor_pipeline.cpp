@@ -10,7 +10,7 @@
 
 namespace dccd {
 
-MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& transforms, const std::string& map_source)
+MonitorPipeline::MonitorPipeline(MonitorConfig config, TransformFeed& transforms, const std::string& map_source)
     : config_(std::move(config)),
       effects_(config_, map_source),
       transforms_(transforms),
@@ -107,9 +107,9 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   keepHint(body, waiting.mesh, is_new);
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
-  Source& source = sources_[body];
-  source.lead.add(waiting.mesh.stamp_ns, message.receipt_ns);
-  if (source.frame != waiting.mesh.frame_id) source.frame = waiting.mesh.frame_id;
+  const double back_s = sources_[body].hear(waiting.mesh, message);
+  if (body == config_.monitor.clock_body && back_s > tolerance::LATE_FRAME_S)
+    transforms_.beginAnew(waiting.mesh.stamp_ns);
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changes;
   points_no_measurement_ += waiting.mesh.no_measurement;
@@ -132,6 +132,7 @@ void MonitorPipeline::OtherMarkers::add(const PassedOver& message) {
 void MonitorPipeline::keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new) {
   const bool first_wrong = !mesh.row_step_hint.empty() && wrong_row_steps_++ == 0;
   const bool others_unread = std::exchange(passed_over_[body].unread, mesh.unread_markers) != mesh.unread_markers;
+  passed_over_[body].may_be_things = passed_over_[body].may_be_things || mesh.has_others;
   if (!is_new && !first_wrong && !others_unread) return;
   hints_[body] = joined(file_hints_[body], meshHint(mesh, config_.bodies[body].input));
 }
@@ -164,6 +165,7 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   }
   if (!map.hint.empty() && map_hints_.insert(map.hint).second) map_hint_ = map.hint;
   map_slow_ = map.slow;
+  if (map.surface) map_lead_.add(map.stamp_ns, map.receipt_ns);
   unplaced_maps_.push_back({std::move(map), now_ns});
   limitUnplacedMaps();
 }
@@ -189,6 +191,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
   nameShortcomings(outcome.arrival_ns, outcome);
+  nameWaitingMap(now_ns, outcome);
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
     promises_.follow(outcome);
@@ -208,10 +211,58 @@ void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
   if (outcome.answered && !transforms_doubt_.empty()) outcome.unproved.push_back(transforms_doubt_);
   for (std::size_t b = 0; b < passed_over_.size() && outcome.answered; ++b) {
     if (!passed_over_[b].may_be_things) continue;
-    outcome.excluded.push_back("messages of other markers on the topic of body '" + config_.bodies[b].body.name + "'");
+    outcome.excluded.push_back("other markers on the topic of body '" + config_.bodies[b].body.name + "'");
   }
+  nameSenders(outcome);
+  nameRenumbered(outcome);
   if (!outcome.answered || !outcome.step->map.surface || outcome.step->map.arrival_ns > doubted_map_ns_) return;
-  outcome.unproved.push_back("where the octomap's frame was at its stamp is not known (" + map_doubt_ + ")");
+  outcome.unproved.push_back(map_doubt_);
+}
+
+double MonitorPipeline::Source::hear(const DecodedMesh& mesh, const MeshMessage& message) {
+  const StampNs before_ns = std::exchange(stamp_ns, mesh.stamp_ns);
+  if (before_ns > mesh.stamp_ns) lead = {};
+  lead.add(mesh.stamp_ns, message.receipt_ns);
+  senders.hear(message.sender);
+  if (frame != mesh.frame_id) frame = mesh.frame_id;
+  is_renumbered = is_renumbered || mesh.weld_changes > 0;
+  return secondsBetween(mesh.stamp_ns, before_ns);
+}
+
+void MonitorPipeline::Senders::hear(const std::string& sender) {
+  if (sender.empty() || sender == last) return;
+  in_turn = in_turn || sender == before;
+  before = std::exchange(last, sender);
+}
+
+void MonitorPipeline::nameSenders(Outcome& outcome) const {
+  for (std::size_t b = 0; outcome.answered && b < sources_.size(); ++b) {
+    const Senders& senders = sources_[b].senders;
+    if (!senders.in_turn) continue;
+    outcome.unproved.push_back("frames of body '" + config_.bodies[b].body.name +
+                               "' came in turn from two publishers, " + shortText(senders.before) + " and " +
+                               shortText(senders.last) + ": which of them shows it is not known (~reset forgets both)");
+  }
+}
+
+/// Corners that come apart number the vertices of a triangle soup anew: those that are named by number are others then.
+void MonitorPipeline::nameRenumbered(Outcome& outcome) const {
+  for (std::size_t b = 0; outcome.answered && b < sources_.size(); ++b) {
+    const BodyConfig& body = config_.bodies[b];
+    const auto namesVertices = [&](const Expectation& one) {
+      return std::any_of(one.partners.begin(), one.partners.end(), [&](const ExpectedPartner& partner) {
+        return partner.body == b && !partner.vertices.empty();
+      });
+    };
+    const std::vector<Expectation>& expected = config_.monitor.detector.expected;
+    const bool is_named =
+        !body.body.vertex_mask.empty() || std::any_of(expected.begin(), expected.end(), namesVertices);
+    if (!sources_[b].is_renumbered || !is_named) continue;
+    outcome.unproved.push_back(
+        "corners of body '" + body.body.name +
+        "' came apart, which numbers its vertices anew, and vertex_mask or expected_contacts names "
+        "them by number; send a mesh with indices, or call ~reset");
+  }
 }
 
 StatsContext MonitorPipeline::counters() const {
@@ -258,7 +309,8 @@ void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   promises_.forget(why);
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
-  for (Source& source : sources_) source.lead = {};
+  for (Source& source : sources_) source.lead = {}, source.senders = {}, source.is_renumbered = false;
+  map_lead_ = {};
   learnAnew(status);
 }
 

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,8 +28,9 @@ namespace dccd {
 /// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
 /// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
 struct LoadedMap : ObstacleMap {
-  std::string hint;  ///< what looks like a mistake in what it was made of; empty: nothing does
-  std::string slow;  ///< that its making takes too long, and what to do; empty: it does not
+  std::string hint;        ///< what looks like a mistake in what it was made of; empty: nothing does
+  std::string slow;        ///< that its making takes too long, and what to do; empty: it does not
+  StampNs receipt_ns = 0;  ///< when what it was made of came, by the clock of stamps; 0: nobody knows
 };
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
@@ -40,7 +42,7 @@ class MonitorPipeline {
  public:
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file, or the
   /// effect that is asked for and that the scene cannot have. `map_source`: as EffectTracker's.
-  MonitorPipeline(MonitorConfig config, const TransformFeed& transforms, const std::string& map_source = {});
+  MonitorPipeline(MonitorConfig config, TransformFeed& transforms, const std::string& map_source = {});
 
   /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
   /// and gives way to the next. Each waits its own time: where tf lags behind a camera by more than the time between
@@ -167,7 +169,7 @@ class MonitorPipeline {
   };
   MonitorConfig config_;
   EffectTracker effects_;
-  const TransformFeed& transforms_;
+  TransformFeed& transforms_;
   std::string transforms_doubt_;
   std::string fixed_frame_;
   TransformTracks tracks_{transforms_, fixed_frame_};
@@ -181,9 +183,20 @@ class MonitorPipeline {
   std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;         // a static body of which the monitor has a frame
   std::vector<std::uint64_t> came_;  // per body, the number of its last message
+  /// Who sent the messages of a topic: one that comes after another one, and did before, is the second of two.
+  struct Senders {
+    std::string last, before;
+    bool in_turn = false;
+    void hear(const std::string& sender);
+  };
   struct Source {
     StampLead lead;
-    std::string frame;  // of the last message
+    Senders senders;
+    bool is_renumbered = false;                              // its vertices, since the first frame
+    StampNs stamp_ns = std::numeric_limits<StampNs>::min();  // of the last frame
+    std::string frame;                                       // of the last message
+    /// Of a frame; returns by how much its stamp is before that of the one before [s].
+    double hear(const DecodedMesh& mesh, const MeshMessage& message);
   };
   std::vector<Source> sources_;  // per body
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
@@ -206,8 +219,10 @@ class MonitorPipeline {
   bool trusted_placed_ = false;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
   std::string map_hint_;                                 // to be told
-  std::set<std::string> map_hints_;   // LoadedMap::hint, as far as they were told; there are a few for each source
-  std::string map_slow_;              // LoadedMap::slow of the newest one
+  std::set<std::string> map_hints_;  // LoadedMap::hint, as far as they were told; there are a few for each source
+  std::string map_slow_;             // LoadedMap::slow of the newest one
+  StampLead map_lead_;
+  StampNs map_stamp_ns_ = std::numeric_limits<StampNs>::min();  // the latest of the maps'
   std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
   std::string map_doubt_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
@@ -288,6 +303,10 @@ class MonitorPipeline {
   void limitUnplacedMaps();
   /// Says of a step with a map that one which came up to then has no place yet.
   void nameNewerMap(std::int64_t came_ns, Outcome& outcome) const;
+  void nameWaitingMap(std::int64_t now_ns, Outcome& outcome) const;
+  void nameSenders(Outcome& outcome) const;
+  void nameRenumbered(Outcome& outcome) const;
+  std::string doubtOf(const ObstacleMap& map, const std::string& frame);
   /// Tf has the frames at the stamp to which maps and static bodies are held.
   bool knowsHeld(StampNs stamp_ns) const;
   /// A map came before a frame of that arrival and has no place yet, but may find one soon.

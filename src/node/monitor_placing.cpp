@@ -18,6 +18,8 @@ namespace {
 // What is stamped later than it comes is stamped by another clock. Two that are kept alike by NTP differ by less; what
 // they differ by is how far things are from where they are taken to be at one time.
 constexpr double MOST_AHEAD_S = 0.25;
+// Where the clock body's stamps are ahead, what is behind them by more than this was not late on its way alone.
+constexpr double MOST_LATE_S = 1;
 
 }  // namespace
 
@@ -134,18 +136,33 @@ void MonitorPipeline::nameNewerMap(std::int64_t came_ns, Outcome& outcome) const
   }
 }
 
+/// One that is stamped after the frames is in use once these reach its stamp, and it has its time for that.
+void MonitorPipeline::nameWaitingMap(std::int64_t now_ns, Outcome& outcome) const {
+  const std::optional<std::int64_t> since_ns = monitor_->mapWaitsSince();
+  if (!outcome.answered || !since_ns || secondsBetween(*since_ns, now_ns) <= config_.answer_timeout_s) return;
+  std::ostringstream text;
+  text << "a newer map came and has not been in use for more than " << std::setprecision(3) << config_.answer_timeout_s
+       << " s";
+  outcome.unproved.push_back(text.str());
+}
+
 /// Where all stamps are ahead alike, it is the clock here that is behind, and nothing is apart in time.
 void MonitorPipeline::nameClocks(Outcome& outcome) const {
   const std::optional<double> clock_s = sources_[config_.monitor.clock_body].lead.seconds();
   if (!outcome.answered || !clock_s) return;
   const auto look = [&](const std::string& name, double ahead_s) {
-    if (!(ahead_s > MOST_AHEAD_S && ahead_s - *clock_s > MOST_AHEAD_S)) return;
-    std::ostringstream text;
-    text << std::setprecision(3) << "stamps of " << name << " are up to " << ahead_s
-         << " s later than they come, those of body '" << config_.bodies[config_.monitor.clock_body].body.name << "' "
-         << std::abs(*clock_s) << (*clock_s > 0 ? " s" : " s earlier")
-         << ": clocks of two computers differ; synchronise them";
-    outcome.unproved.push_back(text.str());
+    const bool is_ahead = ahead_s > MOST_AHEAD_S && ahead_s - *clock_s > MOST_AHEAD_S;
+    const bool is_behind = *clock_s > MOST_AHEAD_S && *clock_s - ahead_s > MOST_LATE_S;
+    if (!is_ahead && !is_behind) return;
+    const auto timesOf = [](double lead_s) {
+      std::ostringstream text;
+      text << std::setprecision(3) << std::abs(lead_s) << (lead_s > 0 ? " s later" : " s earlier");
+      return text.str();
+    };
+    outcome.unproved.push_back("stamps of " + name + " are up to " + timesOf(ahead_s) +
+                               " than they come, those of body '" +
+                               config_.bodies[config_.monitor.clock_body].body.name + "' " + timesOf(*clock_s) +
+                               ": clocks of two computers differ; synchronise them");
   };
   std::set<std::string> frames = monitor_->heldFrames();
   for (const std::optional<Rigid>& rigid : rigid_) {
@@ -156,6 +173,7 @@ void MonitorPipeline::nameClocks(Outcome& outcome) const {
     if (!sources_[b].frame.empty()) frames.insert(sources_[b].frame);
     if (const auto ahead_s = sources_[b].lead.seconds()) look("body '" + config_.bodies[b].body.name + "'", *ahead_s);
   }
+  if (const auto ahead_s = map_lead_.seconds(); ahead_s && outcome.step->map.surface) look("the octomap", *ahead_s);
   std::set<std::string> told;
   for (const std::string& frame : frames) {
     const std::optional<TransformFeed::Ahead> ahead = transforms_.mostAhead(fixed_frame_, frame);

@@ -159,7 +159,7 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
     add(std::to_string(mesh.unread_markers) + (mesh.unread_markers == 1 ? " marker" : " markers") +
         " beside the mesh, the first of which is " + mesh.unread_marker +
         ", may be things of their own and are not read, so that nothing is proved; name what is the mesh by "
-        "marker/namespace and marker/id");
+        "marker/namespace and marker/id, delete what is no more, and publish what belongs together in one MarkerArray");
   }
   add(mesh.camera_hint);
   add(mesh.row_step_hint);

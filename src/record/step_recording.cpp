@@ -216,6 +216,13 @@ void visitPatches(Archive& a, Answer& answer) {
   a.array(answer.patch_of);
 }
 
+/// A recording has in words what was said of the claim.
+void restoreClaim(RecordingWriter&, const Outcome&) {}
+void restoreClaim(RecordingReader&, Outcome& answer) {
+  answer.start_state_complete = answer.complete;
+  if (answer.unproved.empty()) answer.claim.add(0, 1, {});
+}
+
 template <typename Archive, typename Answer>
 void visitAnswer(Archive& a, Answer& answer) {
   visitValues(a, answer.status, answer.reason, answer.answered, answer.complete, answer.cut, answer.start_state,
@@ -230,6 +237,7 @@ void visitAnswer(Archive& a, Answer& answer) {
     for (auto& sentence : *sentences) a.text(sentence);
   }
   visitPatches(a, answer);
+  restoreClaim(a, answer);
 }
 
 template <typename Archive, typename Body>

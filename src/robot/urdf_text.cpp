@@ -77,6 +77,9 @@ std::string problemOf(const XMLElement& collision) {
     const XMLElement* first = collision.FirstChildElement(single);
     if (first && first->NextSiblingElement(single)) return std::string("has more than one <") + single + ">";
   }
+  if (collision.FirstChildElement("pose")) {
+    return "has a <pose>, which is a word of SDF that URDF readers pass over; write <origin>";
+  }
   const XMLElement* origin = collision.FirstChildElement("origin");
   if (origin && origin->Attribute("quat_xyzw")) {
     return "has an origin with quat_xyzw, which URDF readers before urdfdom 5.1 pass over; write rpy";

@@ -28,6 +28,9 @@ tinyxml2::XMLElement& parseRobotXml(const std::string& text, tinyxml2::XMLDocume
   if (std::string(root->Name()) != "robot") {
     throw RobotTextError("begins with " + placeOf(*root) + ", where <robot> is needed");
   }
+  if (const tinyxml2::XMLElement* second = root->NextSiblingElement()) {
+    throw RobotTextError("goes on with " + placeOf(*second) + " behind the end of <robot>");
+  }
   requireExpanded(*root);
   return *root;
 }

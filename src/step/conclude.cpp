@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 #include <tuple>
+#include <utility>
 
 #include "step/parts.h"
 
@@ -175,6 +176,15 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   }
 }
 
+/// What nobody looked at. Where time or a limit left something out, that was said.
+void sayGaps(const Step& step, Outcome& outcome) {
+  if (outcome.claim.holds() || outcome.cut || !outcome.complete) return;
+  outcome.complete = false;
+  std::vector<std::string> names;
+  for (const Body& body : step.bodies) names.push_back(body.name);
+  for (std::string& sentence : outcome.claim.inWords(names)) outcome.unproved.push_back(std::move(sentence));
+}
+
 /// What was left out on request: whoever reads "proved" must see it.
 std::vector<std::string> excludedByChoice(const Options& options, const Step& step, std::uint64_t excluded_voxels) {
   std::vector<std::string> excluded = options.excluded;
@@ -263,7 +273,8 @@ void leaveOut(double toc, bool by_limit, Findings& found) {
   found.unchecked_toc_lower = std::min(found.unchecked_toc_lower, toc);
 }
 
-void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& outcome) {
+void addPart(std::size_t part, std::size_t parts, const std::vector<Gap>& gaps, Findings& result, Outcome& outcome) {
+  outcome.claim.add(part, parts, gaps);
   if (part == 0) {
     outcome.start_state = result.start_state;
     outcome.start_state_complete = result.start_state_complete;
@@ -304,6 +315,7 @@ void conclude(const Options& options, const Step& step, std::size_t needed_parts
   countContacts(outcome);
   keepEarliest(options.max_contacts, outcome);
   judge(options, step, needed_parts, outcome);
+  sayGaps(step, outcome);
   outcome.stats[Effect::OWN_VOXELS].in = step.map.own.looked_at;
   outcome.stats[Effect::OWN_VOXELS].out = step.map.own.own + step.map.own.doubted;
   outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);

@@ -14,8 +14,8 @@ double scaleUp(double toc, std::size_t i, std::size_t n);
 
 /// A limit of what may be found, or else the deadline, left out what does not touch before toc.
 void leaveOut(double toc, bool by_limit, Findings& found);
-/// Appends a part's contacts, the start state of the first one, the statistics.
-void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& outcome);
+/// Appends a part's contacts, the start state of the first one, what nobody looked at, the statistics.
+void addPart(std::size_t part, std::size_t parts, const std::vector<Gap>& gaps, Findings& result, Outcome& outcome);
 /// Contacts of several parts into canonical order, a pair once.
 void joinParts(std::vector<Contact>& contacts);
 /// What of the raw contacts is reported, and what the step may be called.

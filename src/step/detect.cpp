@@ -168,29 +168,30 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
   const Part part{step, index, count, continues, deadline, Clock::now(), prepared, scene, found_limit, per_hit_};
   Findings result;
   pairs.begin();
+  looked_.begin();
   if (!fill(part, result.stats)) {
     // There was no time for its bounds: of the part nothing is known, and of its end neither.
     scene.forgetBounds();
     carried.clear();
     leaveOut(0, false, result);
     result.start_state_complete = !part.checksStartState();
-    addPart(index, count, result, outcome);
+    addPart(index, count, looked_.gaps(step.bodies, false, false), result, outcome);
     return;
   }
   result.stats.left_out_listed = prepared.left_out.list.size();
-  pairs.run(part, self_tests, scene, result);
+  pairs.run(part, self_tests, scene, looked_, result);
   hits_done_ = Clock::now();
   pairs.collect(part, result);
-  const bool all_pairs = result.complete;
-  if (part.checksStartState()) result.start_state = StartState::CLEAR;  // until shown otherwise
-  if (prepared.map.surface && scene.mayMeetMap()) map_search.run(part, carried.map, result);
+  const bool all_pairs = result.complete && looked_.gaps(step.bodies, false, false).empty();
+  const bool has_map = prepared.map.surface != nullptr;
+  const bool map_is_whole = !has_map || !scene.mayMeetMap() || map_search.run(part, carried.map, looked_, result);
   // With earliest_only the contacts after the first are unknown; if there is none, there is no later one either.
   const bool all_known = all_pairs && (!options.earliest_only || result.contacts.empty());
   carried.rememberApart(scene, result.contacts, all_known);
   if (options.earliest_only) keepFirst(options.accuracy.rung == Accuracy::EXACT, result.contacts);
-  findStartState(part, all_known, self_tests.unfolded(), carried, result);
+  findStartState(part, all_known, map_is_whole, self_tests.unfolded(), carried, looked_, result);
   if (options.clearance.wanted) findClearance(part, result);
-  addPart(index, count, result, outcome);
+  addPart(index, count, looked_.gaps(step.bodies, has_map, part.checksStartState() && index == 0), result, outcome);
 }
 
 /// The part's positions into the scene's arrays, and what of it needs bounds. False: there was no time for these.
@@ -203,7 +204,7 @@ bool History::Impl::fill(const Part& part, StepStats& stats) {
   if (scene.uncertain()) checkHoldsDistance(part.options(), "an uncertainty radius");
   stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
   start = Clock::now();
-  self_tests.choose(part, carried.apart, stats);
+  self_tests.choose(part, carried.apart, looked_, stats);
   stats[Stage::BROAD_PHASE].ms += msSince(start);
   start = Clock::now();
   std::atomic<std::size_t> done{0};

@@ -9,6 +9,7 @@
 
 #include "culling/scene_arrays.h"
 #include "dccd/detect.h"
+#include "proof/looked.h"
 #include "step/expected_contacts.h"
 #include "step/map.h"
 #include "step/pairs/left_out.h"
@@ -112,6 +113,7 @@ struct History::Impl {
   Deadline::Clock::time_point hits_done_;      // when the last part's pairs ended
   Deadline::Clock::duration patches_took_{0};  // in the last step
   std::vector<std::uint8_t> bounded_;          // per body: it needs bounds, whatever is near
+  Looked looked_;                              // of the part
 };
 
 }  // namespace dccd

@@ -5,6 +5,8 @@
 
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
+#include "proof/looked.h"
+#include "step/conclude.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -97,7 +99,7 @@ void ReducedMap::set(const ObstacleMap& map, const std::vector<Box>& exclude_box
 
 /// False where the deadline cut it.
 bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>& known, ObstacleStats& total,
-                        Findings& result) {
+                        Looked& looked, Findings& result) {
   const SceneBody& body = part.scene.bodies()[b];
   const double separation_m = part.scene.separation(b, OBSTACLE_BODY);
   const Deadline::Clock::time_point start = Deadline::Clock::now();
@@ -110,6 +112,7 @@ bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>&
   };
   if (!reachesMap(b, part)) {
     if (b < known.size()) known[b] = MapAnswer();  // of a map that it did reach
+    looked.atMap(b);
     count();
     return true;
   }
@@ -138,6 +141,7 @@ bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>&
     result.contacts.insert(result.contacts.end(), answer->contacts.begin(), answer->contacts.end());
     total.pairs_in += answer->pairs;
     ++result.stats.map_answers_kept;
+    looked.atMap(b);
     count();
     return true;
   }
@@ -146,24 +150,24 @@ bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>&
   if (checks_[b]->isFull()) {
     result.cut = true;
   } else if (whole) {
+    looked.atMap(b);
     keepAnswer(b, part, result.contacts, out_before, total.pairs_in - in_before, known);
   }
   count();
   return whole;
 }
 
-void MapSearch::run(const Part& part, std::vector<MapAnswer>& known, Findings& result) {
+bool MapSearch::run(const Part& part, std::vector<MapAnswer>& known, Looked& looked, Findings& result) {
   const Deadline::Clock::time_point start = Deadline::Clock::now();
   const std::vector<SceneBody>& bodies = part.scene.bodies();
   checks_.resize(bodies.size());
   ObstacleStats total;
   const std::size_t before = result.contacts.size();
+  bool whole = true;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (!meetsMap(bodies[b].setup) || runBody(part, b, known, total, result)) continue;
-    result.complete = false;
-    result.unchecked_toc_lower = 0;
-    result.start_state_complete = false;
-    if (result.start_state == StartState::CLEAR) result.start_state = StartState::NOT_CHECKED;
+    if (!meetsMap(bodies[b].setup) || runBody(part, b, known, total, looked, result)) continue;
+    whole = false;
+    leaveOut(0, false, result);
   }
   // Each body's are in order; of several bodies, kinds come first.
   const auto first = result.contacts.begin() + static_cast<std::ptrdiff_t>(before);
@@ -184,6 +188,7 @@ void MapSearch::run(const Part& part, std::vector<MapAnswer>& known, Findings& r
     s.vertex[0] = c.vertex[0];
     result.intersections.push_back(s);
   }
+  return whole;
 }
 
 }  // namespace dccd

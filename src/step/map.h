@@ -11,6 +11,7 @@
 namespace dccd {
 
 struct Part;
+class Looked;
 
 /// `fixed` itself where the frames are the same, else `moved`, filled with the positions in the map's frame [m].
 const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved);
@@ -42,11 +43,12 @@ class MapSearch {
   /// Options or bodies change.
   void forget() { checks_.clear(); }
   /// Adds what the bodies touch; known: of bodies that do not move it is taken from there, and kept there. Where the
-  /// deadline ends it, the result is not complete and its bound on what was left out is 0.
-  void run(const Part& part, std::vector<MapAnswer>& known, Findings& result);
+  /// deadline ends it, the result is not complete and its bound on what was left out is 0. looked: of which bodies all
+  /// was looked at. False: not of all.
+  bool run(const Part& part, std::vector<MapAnswer>& known, Looked& looked, Findings& result);
 
  private:
-  bool runBody(const Part& part, std::size_t body, std::vector<MapAnswer>& known, ObstacleStats& total,
+  bool runBody(const Part& part, std::size_t body, std::vector<MapAnswer>& known, ObstacleStats& total, Looked& looked,
                Findings& result);
 
   std::vector<std::unique_ptr<ObstacleCheck>> checks_;  // per body, once it came near

@@ -81,6 +81,7 @@ void MeshStore::setOptions(const MeshStoreOptions& options) {
 void MeshStore::clear() {
   frames_.clear();
   vertices_ = 0;
+  seen_until_ns_ = NEVER_NS;
 }
 
 void MeshStore::forgetOldest() {
@@ -118,6 +119,7 @@ StepStatus MeshStore::push(MeshFrame frame) {
     unknown = unknownAfterNewest(frame.thinned + 1);
     if (unknown.empty()) unknown = frame.doubt;
   }
+  const StampNs seen_until_ns = status == StepStatus::TIME_JUMP ? lateAfter(frame.stamp_ns) : seen_until_ns_;
   frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_ + (begins ? 1 : 0), came_, {}});
   frames_.back().unknown = std::move(unknown);
   why_.clear();
@@ -126,6 +128,7 @@ StepStatus MeshStore::push(MeshFrame frame) {
     ++run_;
     run_reason_ = status;
   }
+  seen_until_ns_ = seen_until_ns;
   // Stamps must ascend within the store: after a jump back nothing older can be of use. A fast stream of few vertices
   // may run far ahead of a clock body that comes late; large meshes may not fill the memory.
   const std::size_t most = status == StepStatus::TIME_JUMP ? 1 : options_.capacity;
@@ -136,6 +139,16 @@ StepStatus MeshStore::push(MeshFrame frame) {
   while (full()) forgetOldest();
   return status;
 }
+
+/// The latest stamp that came before a frame that is late; NEVER_NS: it is not. Where stamps go back further, time
+/// begins anew.
+StampNs MeshStore::lateAfter(StampNs stamp_ns) const {
+  const StampNs latest_ns = empty() ? seen_until_ns_ : std::max(seen_until_ns_, newest().stamp_ns);
+  const double late_s = secondsBetween(stamp_ns, latest_ns);
+  return late_s > 0 && late_s <= tolerance::LATE_FRAME_S ? latest_ns : NEVER_NS;
+}
+
+void MeshStore::replace(const MeshStore& before, StampNs next_ns) { seen_until_ns_ = before.lateAfter(next_ns); }
 
 void MeshStore::passOver(std::uint64_t count, std::string why) {
   came_ += count;
@@ -163,6 +176,9 @@ std::string MeshStore::unknownAfterNewest(std::uint64_t accounted) const {
 }
 
 std::string MeshStore::unknownWithin(StampNs from_ns, StampNs to_ns) const {
+  if (from_ns < seen_until_ns_) {
+    return "its stamps went back, and what came before with later ones is not used";
+  }
   std::size_t i = firstAtOrAfter(from_ns + 1);
   for (; i < frames_.size() && (i == 0 || frames_[i - 1].frame->stamp_ns < to_ns); ++i) {
     if (!frames_[i].unknown.empty()) return frames_[i].unknown;

@@ -128,6 +128,7 @@ StepStatus Monitor::Impl::push(std::size_t body, MeshFrame frame, std::int64_t n
     // In a store of its own, so that the newest push counts whatever its stamp: a static body's frame holds at all
     // times.
     MeshStore store(options.store);
+    store.replace(stores[body], frame.stamp_ns);
     const StepStatus status = store.push(std::move(frame));
     if (isSeam(status)) {
       stores[body] = std::move(store);

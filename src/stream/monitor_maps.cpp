@@ -33,6 +33,11 @@ const ObstacleMap& Monitor::map() const {
 
 const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
 
+std::optional<std::int64_t> Monitor::mapWaitsSince() const {
+  if (impl_->maps_to_come.empty()) return std::nullopt;
+  return impl_->maps_to_come.front().arrival_ns;
+}
+
 std::set<std::string> Monitor::heldFrames() const {
   const Impl& m = *impl_;
   std::set<std::string> frames;

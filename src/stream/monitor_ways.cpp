@@ -248,6 +248,9 @@ bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
   };
   const auto say = [&](const std::string& why) { sayUnknown(name(), why, step); };
   if (frame && !frame->doubt.empty()) say(frame->doubt);
+  if (const std::string why = frame ? stores[b].unknownWithin(frame->stamp_ns, frame->stamp_ns) : ""; !why.empty()) {
+    say(why);
+  }
   if (!tracks || carrier.empty()) return true;
   const std::vector<Knot> knots =
       is_map ? tracks->between(carrier, {}, step.start_ns, step.stamp_ns, Silence::UNKNOWN)

@@ -14,7 +14,8 @@ CORE = {
     'culling': {'simd'},
     'elementary': {'simd'},
     'obstacle': {'simd'},
-    'step': {'culling', 'elementary', 'obstacle', 'simd'},
+    'proof': set(),
+    'step': {'culling', 'elementary', 'obstacle', 'proof', 'simd'},
     'stream': {'step', 'obstacle'},
     'record': {'stream', 'step', 'culling', 'obstacle', 'simd'},
 }

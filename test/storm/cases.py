@@ -413,6 +413,50 @@ def an_obstacle_that_the_map_forgot_and_shows_again(c):
     c.map([(9, 9, 9), (0, 0, 0)], .92, free=far)
 
 
+def side(t):
+    return .2 if round(t, 3) in (.3, .5) else -.2
+
+
+def frames_that_arrive_in_another_order(c):
+    """The one of 0.4 s has come when the one of 0.3 s does, from which the next step begins."""
+    c.body('object', SMALL, 2, every(.1))
+    c.body('sheet', SHEET, 3, [.3], z=side, delay=.15)
+    c.body('sheet', SHEET, 3, [t for t in every(.1) if round(t, 3) != .3], z=side)
+
+
+def frames_of_another_body_that_arrive_in_another_order(c):
+    c.body('sheet', SHEET, 3, every(.1))
+    c.body('object', SMALL, 2, [.3], z=side, delay=.15)
+    c.body('object', SMALL, 2, [t for t in every(.1) if round(t, 3) != .3], z=side)
+
+
+def a_hole_in_the_transforms_of_a_finger(c):
+    """It comes back on the other side of the sheet."""
+    c.body('sheet', SHEET, 3, every(.1, 4))
+    c.tf('finger', [t for t in every(.05, 4.2, -.1) if not .4 < t < 3.4], z=lambda t: .3 if t < 1 else -.3)
+    c.finger('finger')
+
+
+def a_time_that_begins_anew_without_transforms(c):
+    c.body('sheet', SHEET, 3, every(.1, 2))
+    c.body('sheet', SHEET, 3, every(.1, 1.5, .3), delay=2.5)
+    c.tf('finger', every(.05, 2.2, -.1), z=lambda t: .3)
+    c.finger('finger')
+
+
+def a_map_that_is_stamped_ahead_of_all_frames(c):
+    owned(c, every(.1, 1.5))
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0)], .05, stamp_at=3)
+
+
+def a_map_of_a_clock_that_is_ahead(c):
+    """By its stamp the sheet was there when it shows the voxel, and by when it came it cannot have been."""
+    owned(c, every(.1, 2.5))
+    c.map([(9, 9, 9)], -.05)
+    c.map([(9, 9, 9), (0, 0, 0)], .05, stamp_at=.75)
+
+
 def camera(c, points, times):
     c.params.update(obstacle_cloud_topic='/points', obstacle_resolution_m=.05)
     c.tf('eye', [-.2], z=lambda t: 1, topic='/tf_static')

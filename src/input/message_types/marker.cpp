@@ -12,7 +12,7 @@ using Markers = std::vector<MarkerView>;
 using visualization_msgs::Marker;
 static_assert(MARKER_TRIANGLE_LIST == Marker::TRIANGLE_LIST && MARKER_LINE_STRIP == Marker::LINE_STRIP &&
               MARKER_LINE_LIST == Marker::LINE_LIST && MARKER_SPHERE_LIST == Marker::SPHERE_LIST &&
-              MARKER_POINTS == Marker::POINTS && MARKER_ADD == Marker::ADD);
+              MARKER_POINTS == Marker::POINTS && MARKER_ADD == Marker::ADD && MARKER_DELETE == Marker::DELETE);
 
 MarkerView readMarker(WireReader& wire) {
   MarkerView marker;
@@ -23,7 +23,10 @@ MarkerView readMarker(WireReader& wire) {
   marker.action = wire.read<std::int32_t>("action");
   for (double& value : marker.pose) value = wire.read<double>("pose");
   for (double& value : marker.scale) value = wire.read<double>("scale");
-  wire.skip(4 * 4 + 8 + 1, "color, lifetime, frame_locked");
+  wire.skip(4 * 4, "color");
+  const auto seconds = wire.read<std::int32_t>("lifetime"), nanoseconds = wire.read<std::int32_t>("lifetime");
+  marker.lifetime_ns = StampNs{seconds} * 1'000'000'000 + nanoseconds;
+  wire.skip(1, "frame_locked");
   marker.points = wire.readArray<PointOnWire>("points");
   wire.readArray<std::array<float, 4>>("colors");
   wire.readString("text");
@@ -49,6 +52,7 @@ MarkerView viewOfMarker(const visualization_msgs::Marker& message) {
   const auto& q = message.pose.orientation;
   marker.pose = {p.x, p.y, p.z, q.x, q.y, q.z, q.w};
   marker.scale = {message.scale.x, message.scale.y, message.scale.z};
+  marker.lifetime_ns = message.lifetime.toNSec();
   marker.points = spanOf<PointOnWire>(message.points);
   return marker;
 }

@@ -6,6 +6,7 @@
 #include "base/accuracy.h"
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
+#include "proof/looked.h"
 #include "step/conclude.h"
 #include "step/history.h"
 
@@ -45,7 +46,8 @@ void PairSearch::begin() {
   for (HitOrder& kind : order_) kind.beginStep();
 }
 
-void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays& shortened, Findings& result) {
+void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays& shortened, Looked& looked,
+                     Findings& result) {
   const Options& options = part.options();
   const bool until_first = stopsAtFirst(part);
   StepContext context;
@@ -64,6 +66,10 @@ void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays&
     findPairs(search, self_tests);
     runTasks(search);
   }
+  looked.compared(body_pairs_);
+  for (const Searched& one : searched_) {
+    if (one.listed && one.done == one.superclusters) looked.at(one.kind, one.body_a, one.body_b);
+  }
 }
 
 void PairSearch::runSelf(const Prepared& prepared, const std::vector<std::size_t>& bodies, StepContext& context,
@@ -71,23 +77,43 @@ void PairSearch::runSelf(const Prepared& prepared, const std::vector<std::size_t
   const Search search{prepared, context, foundLimit(*prepared.options, context.scene->bodies()), result};
   tasks_.clear();
   group_pairs_.clear();
+  searched_.clear();
   for (const std::size_t b : bodies) addSelfTasks(search, b);
   runTasks(search);
+}
+
+/// A share of the pairs that is looked for after another one is the same searches', in the same order.
+PairSearch::Searched& PairSearch::nextSearched(const Search& search, PairKind kind, std::size_t a, std::size_t b) {
+  const auto body_a = static_cast<std::uint16_t>(a), body_b = static_cast<std::uint16_t>(b);
+  if (search.share != Share::REST) return searched_.emplace_back(Searched{kind, body_a, body_b});
+  const auto isIt = [&](const Searched& one) {
+    return one.kind == kind && one.body_a == body_a && one.body_b == body_b;
+  };
+  while (!isIt(searched_.at(next_searched_))) ++next_searched_;
+  return searched_[next_searched_++];
 }
 
 void PairSearch::addTasks(const Search& search, PairKind kind, std::size_t a, std::size_t b) {
   const StepContext& context = search.context;
   const TreePair trees = context.treesOf(kind, a, b);
-  if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return;
-  PairTask task{kind, static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b), a == b, 0, 0, false};
+  Searched& searched = nextSearched(search, kind, a, b);
+  if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) {
+    searched.listed = true;
+    return;
+  }
+  PairTask task{kind, searched.body_a, searched.body_b, a == b, 0, 0, 0, false};
+  task.search = static_cast<std::uint32_t>(&searched - searched_.data());
   if (brute_force_) {
     tasks_.push_back(task);
+    searched.listed = true;
+    ++searched.superclusters;
     return;
   }
   const bool limited = search.found_limit != FoundLimit::NONE;
   const std::size_t room = limited ? tolerance::MAX_SUPERCLUSTER_PAIRS - group_pairs_.size() / 2 : FoundLimit::NONE;
   const SearchRest rest = superclusterPairs(trees, found_groups_, scratch_, room, context.deadline);
   if (rest.toc <= 1) leaveOut(rest.toc, !rest.late, search.result);
+  searched.listed = rest.toc > 1 && (search.share != Share::REST || searched.listed);
   if (search.share != Share::ALL) keepShare(search.share == Share::SAMPLE, found_groups_);
   const auto ordering = ORDERING_A_PAIR * static_cast<std::int64_t>(found_groups_.size() / 2);
   const bool late =
@@ -101,6 +127,7 @@ void PairSearch::addTasks(const Search& search, PairKind kind, std::size_t a, st
     task.first = base + first;
     task.last = base + std::min<std::uint32_t>(count, first + TASK_SUPERCLUSTERS);
     tasks_.push_back(task);
+    searched.superclusters += task.last - task.first;
   }
 }
 
@@ -138,6 +165,9 @@ void PairSearch::findPairs(const Search& search, const SelfTests& self_tests) {
   }
   group_pairs_.clear();
   tasks_.clear();
+  next_searched_ = 0;
+  if (search.share != Share::REST) searched_.clear();
+  body_pairs_.clear();
   stats.body_pairs = 0;
   const std::size_t n = scene.bodies().size();
   for (std::size_t b = 0; b < n; ++b) {
@@ -178,20 +208,23 @@ void PairSearch::runTasks(const Search& search) {
   found_.begin(search.found_limit, tasks_.size());
   context.found = &found_;
   task_hits_.assign(tasks_.size(), {});
+  task_done_.assign(tasks_.size(), 0);
   std::atomic<std::size_t> next{0};
   threads(std::min(tasks_.size(), threads.count()), 1, [&](std::size_t, std::size_t) {
     PairWorker& worker = workers_.local();
     for (std::size_t t = next++; t < tasks_.size(); t = next++) {
       task_hits_[t] = {&worker, worker.hits(tasks_[t].kind).size()};
-      if (brute_force_) {
-        worker.runBruteForce(context, tasks_[t], t);
-      } else {
-        worker.run(context, tasks_[t], t, group_pairs_);
-      }
+      task_done_[t] =
+          brute_force_ ? worker.runBruteForce(context, tasks_[t], t) : worker.run(context, tasks_[t], t, group_pairs_);
     }
   });
   if (context.expired) search.result.complete = false;
   cutHits(search);
+}
+
+/// Of the first ones, of which everything that they found is listed.
+void PairSearch::countDone(std::size_t tasks) {
+  for (std::size_t t = 0; t < tasks; ++t) searched_[tasks_[t].search].done += task_done_[t];
 }
 
 /// What only the first contact is asked of: a sample of the pairs says until when the step is to be looked at, and the
@@ -227,6 +260,7 @@ void PairSearch::cutHits(const Search& search) {
   const std::vector<SceneBody>& bodies = search.context.scene->bodies();
   std::size_t listed = 0;
   const std::size_t cut = found_.cutTask(listed);
+  countDone(cut);
   for (std::size_t t = cut; t < tasks_.size(); ++t) {
     const PairTask& task = tasks_[t];
     // A worker's later tasks lie behind in its list, and so go with the first.

@@ -14,6 +14,7 @@ namespace dccd {
 
 struct Part;
 struct Prepared;
+class Looked;
 class SelfTests;
 
 class PairSearch {
@@ -26,7 +27,8 @@ class PairSearch {
   void begin();
   /// Pairs of two bodies, and of those with themselves that are to be. shortened: the part's scene; with earliest_only
   /// its bounds may end before the step. result: of the pairs, what is left out and counted; collect() has the rest.
-  void run(const Part& part, const SelfTests& self_tests, SceneArrays& shortened, Findings& result);
+  /// looked: of which pairs of bodies all was looked at.
+  void run(const Part& part, const SelfTests& self_tests, SceneArrays& shortened, Looked& looked, Findings& result);
   /// Pairs of these bodies with themselves, in a context of the caller's.
   void runSelf(const Prepared& prepared, const std::vector<std::size_t>& bodies, StepContext& context,
                Findings& result);
@@ -48,20 +50,33 @@ class PairSearch {
     Share share = Share::ALL;
   };
 
+  /// One kind of pairs of two bodies, of which the tasks are pieces.
+  struct Searched {
+    PairKind kind;
+    std::uint16_t body_a, body_b;
+    bool listed = false;                      ///< all pairs of superclusters that may touch are in tasks
+    std::size_t superclusters = 0, done = 0;  ///< pairs of these in all tasks, and those that were looked at
+  };
+
   bool stopsAtFirst(const Part& part) const;
   void runUntilFirst(Search& search, const SelfTests& self_tests, SceneArrays& shortened);
   void findPairs(const Search& search, const SelfTests& self_tests);
   void addSelfTasks(const Search& search, std::size_t body);
   void addTasks(const Search& search, PairKind kind, std::size_t a, std::size_t b);
+  Searched& nextSearched(const Search& search, PairKind kind, std::size_t a, std::size_t b);
   void orderByBound(const TreePair& trees);
   void runTasks(const Search& search);
   void cutHits(const Search& search);
+  void countDone(std::size_t tasks);
 
   bool brute_force_ = false;
   Workers workers_;
   std::vector<PairTask> tasks_;
-  std::vector<TaskHits> task_hits_;  // per task
-  FoundLimit found_;                 // by the tasks
+  std::vector<TaskHits> task_hits_;     // per task
+  std::vector<std::size_t> task_done_;  // per task, of its pairs of superclusters
+  std::vector<Searched> searched_;      // in their order, which is that of all shares
+  std::size_t next_searched_ = 0;
+  FoundLimit found_;  // by the tasks
   std::vector<std::uint32_t> group_pairs_, found_groups_, scratch_, body_pairs_;
   std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc_;  // and place, pair of groups
   std::array<HitOrder, 2> order_;                                                        // by PairKind

@@ -72,10 +72,13 @@ void PairWorker::begin(StepContext& context, const PairTask& task, std::size_t i
   begun_ = lap_begun_ = Clock::now();
 }
 
-void PairWorker::end() {
+/// Of so many pairs of superclusters all pairs of features were taken. What is left of these is accounted for now,
+/// unless something ran out meanwhile.
+std::size_t PairWorker::end(std::size_t done) {
   flush();
   const double all_ms = std::chrono::duration<double, std::milli>(lap_begun_ - begun_).count();
   stats_[effect()].ms += all_ms - separated_ms_;
+  return enough_ || context_->expired ? 0 : done;
 }
 
 /// Features of the task, by their slots.
@@ -85,7 +88,7 @@ bool PairWorker::shareVertex(std::size_t i, std::size_t j) const {
   return std::find_first_of(va, va + ta.arity(), vb, vb + tb.arity()) != va + ta.arity();
 }
 
-void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
+std::size_t PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
   begin(context, task, index);
   const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
   const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(firstKind(task.kind)).featureCount());
@@ -104,12 +107,13 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::
     }
   }
   take(slots, n);
-  end();
+  return end(1);
 }
 
-void PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
-                     const std::vector<std::uint32_t>& pairs) {
+std::size_t PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
+                            const std::vector<std::uint32_t>& pairs) {
   begin(context, task, index);
+  std::size_t done = 0;
   const TreePair trees = context.treesOf(task.kind, task.body_a, task.body_b);
   for (std::size_t p = task.first; p < task.last; ++p) {
     const bool whole_pair =
@@ -117,13 +121,16 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
           take(slots, n);
           return goesOn();
         });
-    if (whole_pair) continue;
-    leaveOut(trees, pairs, p);
-    break;
+    if (!whole_pair) {
+      leaveOut(trees, pairs, p);
+      break;
+    }
+    ++done;
   }
-  end();
+  done = end(done);
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
+  return done;
 }
 
 /// Of what was not looked at here all that is known is when the groups can meet.

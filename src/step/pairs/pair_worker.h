@@ -34,6 +34,7 @@ struct PairTask {
   std::uint16_t body_a, body_b;
   bool self;
   std::uint32_t first, last;  ///< supercluster pairs in the step's list
+  std::uint32_t search;       ///< number of the search that it is a piece of
   bool by_bound;              ///< which are in the order in which they can touch, from task to task
   /// `other`, the task before it, is of the same trees, and no bound on the TOC here is earlier than one there.
   bool follows(const PairTask& other) const {
@@ -86,10 +87,12 @@ class PairWorker {
   PairWorker();
   void beginStep();
   /// Streams the task's supercluster pairs through all stages. Ends early where context.found has enough. index: of the
-  /// task.
-  void run(StepContext& context, const PairTask& task, std::size_t index, const std::vector<std::uint32_t>& pairs);
-  /// The same for every pair of features, without any bounds.
-  void runBruteForce(StepContext& context, const PairTask& task, std::size_t index);
+  /// task. Returns of how many of these all pairs of features were accounted for; 0 where time or what may be found ran
+  /// out.
+  std::size_t run(StepContext& context, const PairTask& task, std::size_t index,
+                  const std::vector<std::uint32_t>& pairs);
+  /// The same for every pair of features, without any bounds, as if it were one.
+  std::size_t runBruteForce(StepContext& context, const PairTask& task, std::size_t index);
   /// Forgets the hits of a kind from this one on.
   void dropHits(PairKind kind, std::size_t begin);
 
@@ -99,7 +102,7 @@ class PairWorker {
 
  private:
   void begin(StepContext& context, const PairTask& task, std::size_t index);
-  void end();
+  std::size_t end(std::size_t done);
   bool goesOn() const { return !enough_ && !context_->timeIsUp(); }
   bool shareVertex(std::size_t i, std::size_t j) const;
   /// Pairs of slots whose features share no vertex.

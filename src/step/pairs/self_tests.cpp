@@ -2,6 +2,7 @@
 
 #include <functional>
 
+#include "proof/looked.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -28,18 +29,22 @@ void SelfTests::setBodies(const std::vector<SceneBody>& bodies) {
   for (const SceneBody& body : bodies) unfolded_.emplace_back(body);
 }
 
-void SelfTests::choose(const Part& part, const std::vector<std::uint8_t>& apart, StepStats& stats) {
+void SelfTests::choose(const Part& part, const std::vector<std::uint8_t>& apart, Looked& looked, StepStats& stats) {
   const std::vector<SceneBody>& bodies = part.scene.bodies();
   tested_.assign(bodies.size(), 0);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!meetsItself(bodies[b].setup)) continue;
     unfolded_[b].clear();
-    if (staysApart(part, b, apart)) continue;
+    if (staysApart(part, b, apart)) {
+      looked.atItself(b);
+      continue;
+    }
     const Deadline::Clock::time_point start = Deadline::Clock::now();
     const bool unfolded = certify(part, b);
     stats.unfolded_bodies += unfolded;
     stats[Effect::SELF_COLLISION].ms += msSince(start);
     tested_[b] = !unfolded;
+    if (unfolded) looked.atItself(b);
   }
 }
 

@@ -11,6 +11,7 @@ namespace dccd {
 
 struct Options;
 struct Part;
+class Looked;
 
 /// The certificate has something to say of the body and itself in this step.
 bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t body);
@@ -18,8 +19,8 @@ bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t
 class SelfTests {
  public:
   void setBodies(const std::vector<SceneBody>& bodies);
-  /// apart: Carried::apart.
-  void choose(const Part& part, const std::vector<std::uint8_t>& apart, StepStats& stats);
+  /// apart: Carried::apart. looked: what needs no test.
+  void choose(const Part& part, const std::vector<std::uint8_t>& apart, Looked& looked, StepStats& stats);
 
   /// Per body: its pairs with itself are looked at.
   const std::vector<std::uint8_t>& tested() const { return tested_; }

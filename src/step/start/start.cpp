@@ -2,6 +2,7 @@
 
 #include <functional>
 
+#include "proof/looked.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -32,12 +33,17 @@ bool searchesStart(const Part& part, const Carried& carried) {
   return part.checksStartState() && carried.start_state.needsTrees(part.continues);
 }
 
-void findStartState(const Part& part, bool all_known, const std::vector<Unfolded>& unfolded, Carried& carried,
-                    Findings& result) {
+void findStartState(const Part& part, bool all_known, bool map_is_whole, const std::vector<Unfolded>& unfolded,
+                    Carried& carried, Looked& looked, Findings& result) {
   // Edges alone have no inside, and do not cross but in a contact.
-  if (!part.checksStartState() || !(part.scene.hasFaces() || part.prepared.map.surface)) {
+  const bool may_cross = part.scene.hasFaces() || part.prepared.map.surface;
+  if (!part.checksStartState() || !may_cross) {
     carried.start_state.clear();
     carried.inside.clear();
+    result.start_state_complete = true;
+    if (!part.checksStartState()) return;
+    looked.atStart();
+    result.start_state = StartState::CLEAR;
     return;
   }
   const Clock::time_point start = Clock::now();
@@ -46,12 +52,13 @@ void findStartState(const Part& part, bool all_known, const std::vector<Unfolded
   const auto concluding = part.per_hit * static_cast<std::int64_t>(result.contacts.size());
   const Deadline deadline = part.shareFrom(start).movedBy(-concluding);
   std::vector<StartIntersection> met;
-  result.start_state_complete =
-      listStart(part, deadline, unfolded, carried, result, met) && result.start_state_complete;
+  const bool is_whole = listStart(part, deadline, unfolded, carried, result, met);
+  if (is_whole) looked.atStart();
+  result.start_state_complete = is_whole && map_is_whole;
   if (!met.empty()) {
     result.start_state = StartState::INTERSECTING;
-  } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
-    result.start_state = StartState::NOT_CHECKED;
+  } else if (result.start_state_complete && result.start_state != StartState::INTERSECTING) {
+    result.start_state = StartState::CLEAR;
   }
   if (result.intersections.empty()) {
     result.intersections = std::move(met);

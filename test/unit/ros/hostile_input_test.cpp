@@ -172,8 +172,9 @@ TEST(HostileInput, AGigabyteOfPointsThatAreThere) {
   EXPECT_TRUE(mentions(text, "more than a mesh may have")) << text;
   const Front mesh = Front().header().count(44000000);
   const Gigabyte vertices(mesh.bytes());
-  EXPECT_TRUE(
-      mentions(refusalOf("deformable_ccd/MeshStamped", vertices.data(), GIGABYTE), "more than a mesh may have"));
+  const std::size_t bytes = mesh.bytes().size() + std::size_t{24} * 44000000 + 4;  // with the count of triangles
+  EXPECT_TRUE(mentions(refusalOf("deformable_ccd/MeshStamped", vertices.data(), bytes), "more than a mesh may have"));
+  EXPECT_TRUE(mentions(refusalOf("deformable_ccd/MeshStamped", vertices.data(), bytes + 1), "1 bytes stand after"));
 }
 
 TEST(HostileInput, AMapOfAGigabyte) {

@@ -34,6 +34,16 @@ pcl_msgs::PolygonMesh polygonMesh(const Positions& points, const std::vector<std
   return out;
 }
 
+// As a bag may have them, whose writer took one message type for another.
+TEST(MessageBytes, ThatAreLeftOverAreOfAnotherMessage) {
+  std::vector<std::uint8_t> bytes = test::bytesOf(mesh(SQUARE, HALVES));
+  const auto read = [&] { MeshDecoder({}).decode("deformable_ccd/MeshStamped", {bytes.data(), bytes.size()}); };
+  EXPECT_NO_THROW(read());
+  bytes.push_back(0);
+  EXPECT_TRUE(
+      mentions(test::said<MeshError>(read), "1 bytes stand after a message of type deformable_ccd/MeshStamped"));
+}
+
 template <typename Message>
 DecodedMesh decode(MeshDecoder& decoder, const Message& message) {
   const MeshType& type = *findMeshType(ros::message_traits::datatype(message));

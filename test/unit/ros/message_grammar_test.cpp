@@ -349,6 +349,16 @@ TEST_F(PolygonMeshGrammar, VerticesThatAreNotThere) {
   EXPECT_TRUE(mentions(refusalOf(mesh({{0, 1, 2}, {0, 1, 2, 7}})), "index 7"));
 }
 
+TEST_F(PolygonMeshGrammar, TwoFrames) {
+  pcl_msgs::PolygonMesh two = mesh({{0, 1, 2}});
+  two.header.frame_id = "world";
+  two.cloud.header.frame_id = "camera";
+  EXPECT_TRUE(
+      mentions(refusalOf(two), "header.frame_id is 'world', and cloud.header.frame_id 'camera': name one frame"));
+  two.cloud.header.frame_id.clear();
+  EXPECT_EQ(read(two).frame_id, "world");
+}
+
 // --- visualization_msgs/Marker and MarkerArray
 
 struct MarkerGrammar : MessageGrammar {
@@ -406,6 +416,68 @@ TEST_F(MarkerGrammar, OtherTypesAndActions) {
     EXPECT_EQ(read(both).positions.size(), 3u) << "what was there before goes, and what follows is the mesh";
     EXPECT_EQ(read(both).dropped_faces, 0u);
   }
+}
+
+// RViz shows what came before until it is deleted: it may be a thing, and the newest message does not bring it.
+TEST_F(MarkerGrammar, WhatCameBeforeAndIsShownStill) {
+  const auto numbered = [](int id, double stamp_s = 1, double lifetime_s = 0) {
+    visualization_msgs::Marker one = marker();
+    one.id = id;
+    one.header.stamp = ros::Time(stamp_s);
+    one.lifetime = ros::Duration(lifetime_s);
+    return one;
+  };
+  const auto all = [](std::vector<visualization_msgs::Marker> markers) {
+    visualization_msgs::MarkerArray message;
+    message.markers = std::move(markers);
+    return message;
+  };
+  for (int id = 7; id < 100; ++id) {
+    EXPECT_EQ(read(numbered(id)).dropped_faces > 0, id == 8) << "a stream that is numbered anew each time: " << id;
+  }
+  const DecodedMesh stays = read(numbered(99));
+  EXPECT_EQ(stays.unread_markers, 92u) << "it is none: the others are things";
+  EXPECT_EQ(stays.unread_marker, "('cloth', 7), which came before and was not deleted");
+  EXPECT_GT(stays.dropped_faces, 0u);
+
+  anew();
+  read(numbered(7, 1, 0.5));
+  read(numbered(8, 1.1));
+  EXPECT_EQ(read(numbered(8, 1.4)).unread_markers, 1u);
+  EXPECT_EQ(read(numbered(8, 1.6)).unread_markers, 0u) << "its lifetime is over";
+
+  for (int k = 0; k < 6; ++k) {
+    if (k == 0) anew();
+    EXPECT_EQ(read(all({numbered(k % 2)})).unread_markers, k == 0 ? 0u : 1u) << "two things in turn";
+  }
+
+  anew();
+  read(numbered(7));
+  visualization_msgs::Marker gone = numbered(7);
+  gone.action = visualization_msgs::Marker::DELETE;
+  EXPECT_FALSE(refusalOf(gone).empty());
+  EXPECT_EQ(read(numbered(8)).unread_markers, 0u);
+  EXPECT_EQ(read(numbered(8)).unread_markers, 0u);
+
+  for (const int action : {2, 3}) {
+    anew();
+    visualization_msgs::Marker beside = numbered(1);
+    beside.type = visualization_msgs::Marker::CUBE;
+    read(all({numbered(7), beside}));
+    EXPECT_EQ(read(all({numbered(7)})).unread_markers, 1u) << "what is beside the mesh was sent once";
+    gone = numbered(1);
+    gone.action = action;
+    EXPECT_EQ(read(all({gone, numbered(7)})).unread_markers, 0u);
+  }
+
+  config.is_static = true;
+  anew();
+  EXPECT_EQ(read(numbered(0)).unread_markers, 0u);
+  EXPECT_EQ(read(numbered(1)).unread_markers, 1u) << "boards of a shelf, each sent once";
+  config.marker_id = 1;
+  anew();
+  read(numbered(1));
+  EXPECT_EQ(read(numbered(1)).unread_markers, 0u);
 }
 
 // What may be a thing beside the mesh is not passed over in silence.

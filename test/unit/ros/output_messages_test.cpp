@@ -18,6 +18,7 @@ namespace {
 Outcome nothingFound(StepStatus status, StartState start, const std::string& reason = "") {
   Outcome outcome;
   outcome.answered = true;
+  outcome.claim.add(0, 1, {});
   outcome.status = status;
   outcome.reason = reason;
   outcome.start_state = start;

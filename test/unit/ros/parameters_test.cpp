@@ -115,8 +115,12 @@ TEST(Parameters, WhatLimitsLeaveOutOfCloudsAndPicturesIsSaid) {
                 "what the picture of body 'seen' shows farther than 4 m by topology/max_range_m",
                 "what the picture of body 'seen' shows nearer than 0.5 m by "
                 "topology/min_range_m",
+                "what the picture of body 'seen' shows in points that have no neighbours within topology/max_edge_m, "
+                "0.05 m, and between each pixel and the next one by topology/stride, 4",
             }));
-  EXPECT_TRUE(excludedBy(picture + "stride: 2}}}").empty());
+  EXPECT_EQ(excludedBy(picture + "stride: 1, max_edge_m: 0.1}}}"),
+            std::vector<std::string>{"what the picture of body 'seen' shows in points that have no neighbours within "
+                                     "topology/max_edge_m, 0.1 m"});
 }
 
 TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {

@@ -47,6 +47,31 @@ TEST_F(TransformFeedTest, AQuaternionThatIsNoneIsSaidOnceWithItsValues) {
   EXPECT_EQ(feed.unusable(), 4u);
 }
 
+TEST_F(TransformFeedTest, WhereTimeBeginsAnewWhatWasSentForLaterTimesIsForgotten) {
+  const auto isKnown = [&](const std::string& frame, StampNs stamp_ns) {
+    Eigen::Isometry3d pose;
+    std::string reason;
+    return feed.lookup("world", frame, stamp_ns, pose, reason);
+  };
+  constexpr StampNs S = 1000000000;
+  const auto send = [&](double until_s) {
+    for (const char* frame : {"a", "b"}) {
+      for (const double stamp_s : {1.0, until_s}) feed.add(turned(frame, 1, stamp_s), false, frame);
+    }
+  };
+  feed.add(turned("fixed", 1, 20), true, "/fixed");
+  send(2);
+  feed.beginAnew(2 * S);
+  EXPECT_TRUE(isKnown("a", 2 * S)) << "all of it is of the time that begins";
+  feed.add(turned("b", 1, 12), false, "b");
+  feed.beginAnew(2 * S);
+  for (const char* frame : {"a", "b"}) EXPECT_FALSE(isKnown(frame, 2 * S)) << frame;
+  EXPECT_TRUE(isKnown("fixed", 2 * S));
+  EXPECT_EQ(feed.timesForgotten(), 1u);
+  send(3);
+  for (const char* frame : {"a", "b"}) EXPECT_TRUE(isKnown(frame, 2 * S)) << frame;
+}
+
 TEST_F(TransformFeedTest, WhateverIsWrongIsNamed) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::pair<tf2_msgs::TFMessage, const char*> cases[] = {

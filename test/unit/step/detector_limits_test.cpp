@@ -125,6 +125,7 @@ TEST(DetectorLimits, EarliestOnlyUnderABudgetKeepsItsWord) {
     for (int sample = 0; sample < 16; ++sample) {
       const Outcome part = runFor(looks * sample / 16, step, options);
       cut += !part.complete;
+      EXPECT_EQ(part.claim.holds(), part.complete) << sample << " of 16";
       if (part.complete) {
         EXPECT_EQ(part.earliest_toc, full.earliest_toc);
       } else if (part.earliest_toc > full.earliest_toc) {
@@ -224,6 +225,7 @@ TEST(DetectorLimits, BudgetEndsTheStep) {
   options.step_budget_ms = 1e-6;
   const Outcome part = runOnce(step, options);
   EXPECT_FALSE(part.complete);
+  EXPECT_FALSE(part.claim.holds());
   EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
   for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY, Stage::START_STATE}) {
     EXPECT_GT(full[stage].in, 1000u) << toString(stage);
@@ -315,6 +317,7 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
   step.map.surface = VoxelSurface::build(1.0, voxelsOfBox({0, 0, 0}, {SIZE, SIZE, 1}));
   const Outcome full = runFor(MANY, step);
   EXPECT_TRUE(full.complete);
+  EXPECT_TRUE(full.claim.holds());
   ASSERT_GT(full.contacts.size(), 1000u);
   const std::int64_t looks = looksOf(step);
   std::size_t listed = 0;
@@ -322,6 +325,7 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
     const Outcome part = runFor(looks * share / 10, step);
     listed += part.contacts.size();
     EXPECT_FALSE(part.complete) << share;
+    EXPECT_FALSE(part.claim.holds());
     EXPECT_EQ(part.unchecked_toc_lower, 0);
     EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
     EXPECT_LT(part.contacts.size(), full.contacts.size());

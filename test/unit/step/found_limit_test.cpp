@@ -39,6 +39,7 @@ void expectCut(const Outcome& outcome, std::size_t limit) {
   EXPECT_EQ(outcome.status, StepStatus::TRUNCATED);
   EXPECT_TRUE(outcome.cut);
   EXPECT_FALSE(outcome.complete);
+  EXPECT_FALSE(outcome.claim.holds());
   EXPECT_LE(outcome.total_contacts, limit);
   EXPECT_LE(outcome.intersections.size(), limit);
   EXPECT_FALSE(assuranceOf(outcome).proved);
@@ -172,6 +173,7 @@ TEST(FoundLimit, ALimitThatIsNotReachedChangesNothing) {
   const Outcome whole = runOnce(step, options);
   EXPECT_FALSE(whole.cut);
   EXPECT_TRUE(whole.complete);
+  EXPECT_TRUE(whole.claim.holds());
   expectSameAnswer(whole, full);
 }
 

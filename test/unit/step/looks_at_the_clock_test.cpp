@@ -70,6 +70,7 @@ TEST(LooksAtTheClock, BetweenTwoLiesLittleWork) {
       const std::int64_t at = looks * sample / SAMPLES + sample % 3;
       const Outcome before = runFor(at, step, options), after = runFor(at + 1, step, options);
       EXPECT_FALSE(before.complete) << name << ", look " << at << " of " << looks;
+      EXPECT_FALSE(before.claim.holds());
       const auto work_before = workOf(before.stats);
       for (const auto& [what, done] : workOf(after.stats)) {
         const std::uint64_t least = std::min(done.first, work_before.at(what).first);
@@ -96,12 +97,14 @@ TEST(LooksAtTheClock, BoundsOfALargeMeshAreMadeInPieces) {
   const Outcome cut = runFor(looks, step, options, history);
   EXPECT_EQ(cut.status, StepStatus::DEADLINE);
   EXPECT_FALSE(cut.complete);
+  EXPECT_FALSE(cut.claim.holds());
   EXPECT_EQ(cut.unchecked_toc_lower, 0);
   EXPECT_TRUE(cut.contacts.empty());
   EXPECT_EQ(cut.stats[Stage::BROAD_PHASE].in, 0u);
   // Nothing of bounds that were not made is kept.
   const Outcome again = runFor(MANY, step, options, history), fresh = runFor(MANY, step, options);
   EXPECT_TRUE(again.complete);
+  EXPECT_TRUE(again.claim.holds());
   ASSERT_GT(fresh.contacts.size(), 1000u);
   EXPECT_EQ(difference(again.contacts, fresh.contacts), "");
 }

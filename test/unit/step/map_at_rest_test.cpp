@@ -31,6 +31,7 @@ struct OnAMap : testing::Test {
     const Outcome expected = Detector().run(step);
     EXPECT_EQ(difference(with.contacts, expected.contacts), "");
     EXPECT_EQ(with.start_state, expected.start_state);
+    EXPECT_TRUE(with.claim.holds());
     EXPECT_EQ(with.intersections.size(), expected.intersections.size());
     kept = with.stats.map_answers_kept;
     return with;

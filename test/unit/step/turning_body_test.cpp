@@ -221,6 +221,7 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
   const Outcome cut = run(1e-6);
   EXPECT_EQ(cut.status, StepStatus::DEADLINE);
   EXPECT_FALSE(cut.complete);
+  EXPECT_FALSE(cut.claim.holds());
   EXPECT_FALSE(assuranceOf(cut).clear());
   EXPECT_EQ(bodies(cut.stats), 2u) << "the first part alone";
   EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));

@@ -72,12 +72,15 @@ XmlRpcValue clothAndTip() {
 struct Carried : Clocks {
   bool is_one_sender = false;
   Carried() : Clocks(clothAndTip()) {}
+  void send(const std::string& frame, double now_s, double ahead_s) {
+    tf2_msgs::TFMessage message;
+    message.transforms = {above(frame, 0.5, ros::Time(START_S) + ros::Duration(now_s + ahead_s))};
+    feed_tf.add(message, false, is_one_sender ? "both" : frame, at(now_s));
+  }
   /// A tenth of a second: of tf, and from the start on of the cloth.
   void tick(int i, double tip_ahead_s, double other_ahead_s = 0) {
     for (const auto& [frame, ahead_s] : {std::pair("tip", tip_ahead_s), {"elsewhere", other_ahead_s}}) {
-      tf2_msgs::TFMessage message;
-      message.transforms = {above(frame, 0.5, ros::Time(START_S) + ros::Duration(0.1 * i + ahead_s))};
-      feed_tf.add(message, false, is_one_sender ? "both" : frame, at(0.1 * i));
+      send(frame, 0.1 * i, ahead_s);
     }
     if (i < 0) return;
     takeOf(0, 0.1 * i, 0, 0);
@@ -99,6 +102,98 @@ TEST(ClocksOfTwoComputers, OfAFrameThatCarriesABody) {
                 std::string::npos)
           << describe(said);
     }
+  }
+}
+
+// As analyze_bag has it, where tf is read ahead of the messages that it places.
+TEST(ClocksOfTwoComputers, OfTheClockBodyAlone) {
+  for (const auto& [cloth_s, tip_s, alike] : {std::tuple(3.0, 0.0, false), {3.0, 3.0, true}, {3.0, 2.3, true}}) {
+    Carried cell;
+    for (int i = -30; i <= 80; ++i) cell.send("tip", 0.1 * i, tip_s);
+    for (int i = 0; i <= 10; ++i) {
+      cell.takeOf(0, 0.1 * i, cloth_s, 0);
+      while (cell.pipeline.nextOutcome(0, cell.outcome)) continue;
+    }
+    ASSERT_TRUE(cell.outcome.answered) << cell.outcome.reason;
+    const Assurance said = assuranceOf(cell.outcome);
+    EXPECT_EQ(said.proved, alike) << tip_s << " " << describe(said);
+    if (alike) continue;
+    EXPECT_NE(describe(said).find("stamps of the frame 'tip' are up to 0 s earlier than they come, those of body "
+                                  "'cloth' 3 s later"),
+              std::string::npos)
+        << describe(said);
+  }
+}
+
+// What a map shows would count as being there when the body was, which came later: the body's own.
+TEST(ClocksOfTwoComputers, OfAMap) {
+  for (const double ahead_s : {0.0, 0.2, 1.25}) {
+    Clocks bodies(scene("octomap_topic: /map, bodies: {a: {topic: a}, b: {topic: b}}"));
+    LoadedMap map = decodeMapMessage(mapOf(table(), 0), bodies.config);
+    map.stamp_ns = at(ahead_s);
+    map.receipt_ns = at(0);
+    bodies.pipeline.setMap(map, 0);
+    const Assurance said = assuranceOf(bodies.run(0, 0));
+    EXPECT_EQ(said.proved, ahead_s < 1) << ahead_s << " " << describe(said);
+    if (said.proved) continue;
+    EXPECT_NE(describe(said).find("stamps of the octomap are up to 1.25 s later than they come"), std::string::npos)
+        << describe(said);
+    bodies.pipeline.reset(StepStatus::RESET, "a test");
+    map.stamp_ns = at(0);
+    bodies.pipeline.setMap(map, 0);
+    EXPECT_TRUE(assuranceOf(bodies.run(0, 0)).proved) << "the clock was set";
+  }
+}
+
+// A recording begins anew, or a simulation: what was sent for times of the one before places nothing of this one.
+TEST(ATimeThatBeginsAnew, IsNotPlacedByTheTransformsOfTheOneBefore) {
+  for (const bool tf_comes : {true, false}) {
+    Carried cell;
+    for (int i = -1; i <= 40; ++i) cell.tick(i, 0);
+    ASSERT_TRUE(assuranceOf(cell.outcome).proved) << describe(assuranceOf(cell.outcome));
+    for (int i = 5; i <= 8; ++i) {
+      if (tf_comes) {
+        cell.tick(i, 0);
+      } else {
+        cell.takeOf(0, 0.1 * i, 0, 0);
+        while (cell.pipeline.nextOutcome(2000000000, cell.outcome)) continue;
+      }
+    }
+    const Assurance said = assuranceOf(cell.outcome);
+    EXPECT_EQ(said.proved, tf_comes) << describe(said);
+    if (!tf_comes) EXPECT_EQ(cell.outcome.status, StepStatus::NO_TRANSFORM) << describe(said);
+  }
+}
+
+// The arm's driver was started anew: where it was meanwhile nobody knows, though tf goes on from one place to the
+// other.
+TEST(AHoleInTf, IsNoWay) {
+  for (const double hole_s : {1.9, 2.1}) {
+    Carried cell;
+    for (int i = -20; i <= 0; ++i) cell.send("tip", 0.1 * i, 0);
+    for (int i = 0; i <= 40; ++i) cell.send("tip", hole_s + 0.1 * i, 0);
+    for (int i = 0; i <= 10; ++i) {
+      cell.takeOf(0, 0.5 + 0.1 * i, 0, 0);
+      while (cell.pipeline.nextOutcome(0, cell.outcome)) continue;
+    }
+    EXPECT_EQ(assuranceOf(cell.outcome).proved, hole_s < 2) << describe(assuranceOf(cell.outcome));
+    for (int i = 11; i <= 25; ++i) {
+      cell.takeOf(0, 0.5 + 0.1 * i, 0, 0);
+      while (cell.pipeline.nextOutcome(0, cell.outcome)) continue;
+    }
+    EXPECT_TRUE(assuranceOf(cell.outcome).proved) << "behind it " << describe(assuranceOf(cell.outcome));
+  }
+}
+
+// Only the body's: what it was ahead by says nothing from then on of the others.
+TEST(ClocksOfTwoComputers, UntilTheClockOfTheClockBodyIsSet) {
+  Carried cell;
+  for (int i = -30; i <= 60; ++i) cell.send("tip", 0.1 * i, 2);
+  for (int i = 0; i <= 24; ++i) {
+    cell.takeOf(0, 0.1 * i, i < 20 ? 2 : 0, 0);
+    while (cell.pipeline.nextOutcome(0, cell.outcome)) continue;
+    if (i > 0 && i < 20) EXPECT_TRUE(assuranceOf(cell.outcome).proved) << i << describe(assuranceOf(cell.outcome));
+    if (i > 20) EXPECT_FALSE(assuranceOf(cell.outcome).proved) << i;
   }
 }
 

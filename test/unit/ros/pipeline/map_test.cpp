@@ -22,6 +22,26 @@ TEST(Map, OneThatIsNamedIsMissedFromTheFirstStepOn) {
   EXPECT_TRUE(assuranceOf(unnamed.feed(1.1, 0.34f)).clear()) << "nobody called for one";
 }
 
+// Which of the two shows how things are now?
+TEST(Map, OneThatComesAfterALaterOneIsInDoubt) {
+  Driven driven(scene("octomap_topic: /table"));
+  driven.feed(1, 0.35f);
+  std::int64_t arrival_ns = 0;
+  const auto saidWith = [&](double map_stamp_s, double stamp_s) {
+    LoadedMap map = decodeMapMessage(mapOf(table(), map_stamp_s), driven.config);
+    map.arrival_ns = ++arrival_ns;
+    driven.pipeline.setMap(std::move(map), 0);
+    return assuranceOf(driven.feed(stamp_s, 0.35f));
+  };
+  EXPECT_TRUE(saidWith(10, 1.1).proved);
+  const Assurance late = saidWith(9.5, 1.2);
+  EXPECT_NE(describe(late).find("the octomap in use is stamped before one that came before it"), std::string::npos)
+      << describe(late);
+  EXPECT_FALSE(saidWith(9.9, 1.3).proved);
+  EXPECT_TRUE(saidWith(10, 1.4).proved);
+  EXPECT_TRUE(saidWith(2, 1.5).proved) << "a time that begins anew";
+}
+
 TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
   Driven driven(scene("max_map_mb: 1"));
   MapLoader loader(driven.config, driven.feed_tf, [] {});

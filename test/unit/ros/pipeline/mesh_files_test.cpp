@@ -92,7 +92,7 @@ TEST(Inside, AMeshFileInMillimetresIsHintedAt) {
 
 std::string errorOf(const XmlRpcValue& tree) {
   tf2::BufferCore transforms;
-  const TransformFeed feed(transforms);
+  TransformFeed feed(transforms);
   return said<ParameterError>([&] { MonitorPipeline pipeline(readConfig(tree), feed); });
 }
 

@@ -82,6 +82,27 @@ TEST_F(OwnVoxelsOfANode, AMapThatIsRefusedOrGivesWayLeavesInDoubtWhatTheNextOneS
   }
 }
 
+// A map that is stamped ahead of the bodies' frames waits for these, but not for ever.
+TEST_F(OwnVoxelsOfANode, AMapThatWaitsForTheFramesHasItsTime) {
+  for (const bool is_given : {true, false}) {
+    Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));
+    driven.feed(1, 0.8f);
+    driven.giveMap(tableAnd(false), 1);
+    ASSERT_TRUE(assuranceOf(driven.feed(1.1, 0.8f)).clear());
+    LoadedMap ahead = decodeMapMessage(mapOf(tableAnd(true), 3), driven.config);
+    ahead.arrival_ns = 1;
+    if (is_given) driven.pipeline.setMap(std::move(ahead), 1);
+    for (const auto& [now_s, in_time] : {std::pair(0.4, true), {0.6, !is_given}}) {
+      driven.take(0, cloud(1.2 + now_s / 10, 0.8f));
+      ASSERT_TRUE(driven.pipeline.nextOutcome(static_cast<std::int64_t>(now_s * 1e9), driven.outcome));
+      const std::string said = describe(assuranceOf(driven.outcome));
+      EXPECT_EQ(assuranceOf(driven.outcome).clear(), in_time) << now_s << " " << said;
+      const bool is_named = said.find("a newer map came and has not been in use for more than 0.5 s") < said.size();
+      EXPECT_EQ(is_named, !in_time) << said;
+    }
+  }
+}
+
 // Which of the ways it was is said.
 TEST_F(OwnVoxelsOfANode, WhyMapsWereNotLookedAtIsSaid) {
   Driven driven(scene("own_voxels_m: auto, octomap_topic: /map"));

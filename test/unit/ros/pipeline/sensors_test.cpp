@@ -127,6 +127,17 @@ TEST(Sensors, ADepthPictureMakesTheMapThatItsPointsMake) {
   }
 }
 
+// What it shows may be gone by then, and the newer one in the map has cleared it.
+TEST(Sensors, AViewThatComesAfterALaterOneIsRefused) {
+  Camera camera;
+  EXPECT_EQ(camera.whyNot(pictureOf(5, tableDepth)), "");
+  EXPECT_TRUE(says(camera.whyNot(pictureOf(4.5, tableDepth)),
+                   "it is stamped 0.500000 s before one from there that is in the map"));
+  EXPECT_EQ(camera.whyNot(pictureOf(5, tableDepth)), "") << "of one stamp";
+  EXPECT_EQ(camera.whyNot(pictureOf(5.1, tableDepth)), "");
+  EXPECT_EQ(camera.whyNot(pictureOf(1, tableDepth)), "") << "a time that begins anew";
+}
+
 TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
   struct Case {
     sensor_msgs::Image picture;

@@ -20,6 +20,24 @@ struct Tabled : Driven {
   static constexpr std::size_t CLOTH = 0, TABLE = 1;
 };
 
+TEST(StaticBodies, AFrameThatComesAfterALaterOneProvesNothing) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  const auto saidWith = [&](double table_s, double stamp_s) {
+    scene.take(Tabled::TABLE, table_s, 0, 0);
+    scene.take(Tabled::CLOTH, stamp_s, 0.3f, 0);
+    while (scene.pipeline.nextOutcome(0, scene.outcome)) continue;
+    return assuranceOf(scene.outcome);
+  };
+  saidWith(5, 1);
+  EXPECT_TRUE(saidWith(5.1, 1.1).proved);
+  const Assurance late = saidWith(5.05, 1.2);
+  EXPECT_FALSE(late.proved);
+  EXPECT_NE(describe(late).find("its stamps went back"), std::string::npos) << describe(late);
+  EXPECT_TRUE(saidWith(5.2, 1.3).proved);
+  EXPECT_TRUE(saidWith(2, 1.4).proved) << "a time that begins anew";
+}
+
 TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   Tabled scene;
   scene.take(Tabled::TABLE, 1, 0, 0);

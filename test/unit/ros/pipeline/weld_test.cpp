@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <visualization_msgs/Marker.h>
 
+#include "dccd/assurance.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -47,6 +48,26 @@ TEST(Weld, AResetWeldsAnew) {
   welded.pipeline.reset(StepStatus::RESET);
   EXPECT_EQ(vertices(0), 4u) << "the first frame after a reset is a first frame";
   EXPECT_EQ(welded.pipeline.counters().weld_changes, 2u);
+}
+
+// A number that stood for one vertex stands for another one once corners came apart.
+TEST(Weld, NumbersOfVerticesThatCameApartProveNothing) {
+  for (const auto& [names, is_masked] : {std::pair("", false), {"vertex_mask: [3]", true}}) {
+    Driven welded(scene(names));
+    double stamp_s = 1;
+    const auto said = [&](double apart) {
+      for (int frame = 0; frame < 2; ++frame) {
+        welded.pipeline.take(0, {"visualization_msgs/Marker", soup(stamp_s += 0.1, apart), 0, 0});
+        EXPECT_TRUE(welded.pipeline.nextOutcome(0, welded.outcome));
+      }
+      EXPECT_TRUE(welded.outcome.answered) << welded.outcome.reason;
+      return assuranceOf(welded.outcome);
+    };
+    EXPECT_TRUE(said(0).proved);
+    EXPECT_EQ(said(0.5).proved, !is_masked) << describe(assuranceOf(welded.outcome));
+    welded.pipeline.reset(StepStatus::RESET);
+    EXPECT_TRUE(said(0.5).proved) << "numbered as they are now";
+  }
 }
 
 }  // namespace

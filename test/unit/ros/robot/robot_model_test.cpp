@@ -267,6 +267,14 @@ TEST_F(RobotModel, AnOriginByQuaternionIsRefused) {
       << joinedText(robot.missing);
 }
 
+TEST_F(RobotModel, APlaceInTheWordsOfSdfIsRefused) {
+  const std::string box = "<box size='1 1 1'/>", pose = "<pose>0 0 0.5 0 1.57 0</pose>";
+  const Robot robot = robotFrom(robotOf(link("a", collision(box, pose) + collision(box))));
+  EXPECT_EQ(robot.parts.size(), 1u);
+  EXPECT_TRUE(says(robot.missing, "link 'a' is not watched: its collision element 1 (line 1) has a <pose>"))
+      << joinedText(robot.missing);
+}
+
 // As RViz, which asks for a file's address.
 TEST_F(RobotModel, AnAddressMayHaveEscapes) {
   tetrahedron("a b.stl");
@@ -300,6 +308,7 @@ TEST_F(RobotModel, ATextThatIsNoUrdfIsNamedWithItsPlace) {
       {"<robot name='a'>\n<link name='b'>\n</robot>", "test.urdf is no XML: XML_ERROR_MISMATCHED_ELEMENT in line"},
       {"", "test.urdf is no XML: XML_ERROR_EMPTY_DOCUMENT"},
       {"\n<COLLADA/>", "test.urdf begins with <COLLADA> of line 2, where <robot> is needed"},
+      {"<robot name='a'/>\n<robot name='b'/>", "test.urdf goes on with <robot> of line 2 behind the end of <robot>"},
       {robotOf("<link/>"), "test.urdf <link> of line 1 needs the attribute name"},
       {robotOf(""), "test.urdf No link elements found"},
       {robotOf(link("a", "") + link("a", "")), "link 'a' is not unique"},
