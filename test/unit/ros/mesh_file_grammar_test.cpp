@@ -627,6 +627,26 @@ TEST_F(PlyGrammar, OtherElements) {
 }
 
 TEST_F(PlyGrammar, Edges) {
+TEST_F(PlyGrammar, ElementsThatMayHoldFaces) {
+  const auto withPoly = [](const std::string& type, const std::string& rows, const std::string& name = "poly") {
+    const auto count = std::to_string(std::count(rows.begin(), rows.end(), '\n'));
+    return head(xyz() + faceElement() + "element " + name + " " + count + "\nproperty list uchar " + type + " idx\n") +
+           points() + faces() + rows;
+  };
+  const MeshFile mesh = read("a.ply", withPoly("int", "0\n3 1 3 2\n3 0 1 3\n"));
+  EXPECT_EQ(mesh.faces, TWO) << "the rest is used";
+  EXPECT_EQ(mesh.unchecked, (std::vector<std::size_t>{2, 3})) << "an empty list holds nothing";
+  ASSERT_EQ(mesh.hints.size(), 2u);
+  EXPECT_TRUE(mentions(mesh.hints[0], "'poly' (3) is skipped, though its lists of integers may be faces"));
+  EXPECT_TRUE(
+      mentions(mesh.hints[1], "2 polygons cannot be used and are unchecked, the first is row 1 of element 'poly'"));
+  const MeshFile both = read("a.ply", head(xyz() + faceElement(3) + "element poly 1\nproperty list uchar uint idx\n") +
+                                          points() + faces() + "3 0 1 0\n3 1 3 2\n");
+  EXPECT_EQ(both.unchecked, (std::vector<std::size_t>{3})) << "what repeats a corner lies in another face";
+  EXPECT_EQ(read("a.ply", withPoly("float", "3 1 3 2\n")).unchecked.size(), 0u);
+  EXPECT_EQ(read("a.ply", withPoly("int", "1 0\n", "range_grid")).unchecked.size(), 0u) << "a scanner's pixels";
+}
+
   const auto edges = [](const std::string& rows, const std::string& type = "int") {
     const auto count = std::to_string(std::count(rows.begin(), rows.end(), '\n'));
     return head(xyz() + "element face 0\nproperty list uchar int vertex_indices\nelement edge " + count +
