@@ -1,6 +1,7 @@
 #include "node/bag_replay.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <set>
@@ -12,7 +13,7 @@
 #include "input/message_type.h"
 #include "input/short_text.h"
 #include "input/transforms.h"
-#include "node/bag_reading.h"
+#include "node/bag_pieces.h"
 #include "octomap/coarser.h"
 #include "output/output_messages.h"
 #include "report/progress_bar.h"
@@ -21,8 +22,15 @@ namespace dccd {
 namespace {
 
 constexpr std::size_t MOST_NAMES = 6;
+// A longer pause than this between two bags is told.
+const ros::Duration LONG_PAUSE(10.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
+
+/// As the words of an error begin.
+std::string bagsInWords(const std::vector<std::string>& paths) {
+  return paths.front() + (paths.size() == 1 ? "" : " and " + std::to_string(paths.size() - 1) + " more");
+}
 
 StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
 
@@ -91,7 +99,7 @@ struct BagReplay::Run {
   const Sink& sink;
   const Sink& predictions;
   const Variation& variation;
-  rosbag::Bag bag;
+  const OpenBags bags;
   tf2::BufferCore transforms{TransformWindow::length()};
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
@@ -104,10 +112,14 @@ struct BagReplay::Run {
   BagReplaySummary summary;
   std::set<std::string> complained;
   bool lacked_transform = false;
+  bool repeats_latched = false;      // as rosbag record --repeat-latched does at the begin of a piece
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
-      : sink(to), predictions(predictions_to), variation(r.options_.variation), pipeline(r.config_, feed) {
-    openBag(r.path_, bag);
+      : sink(to),
+        predictions(predictions_to),
+        variation(r.options_.variation),
+        bags(r.paths_),
+        pipeline(r.config_, feed) {
     pipeline.setTopologyFilter(variation.topology);
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
@@ -171,7 +183,8 @@ struct BagReplay::Run {
   /// They are known from the start: a picture may come before its own.
   void hearFirstCameraInfos() {
     for (const std::string& topic : clouds.infoTopics()) {
-      rosbag::View infos(bag, rosbag::TopicQuery(topic));
+      rosbag::View infos;
+      bags.show(infos, {topic});
       if (infos.size() > 0) clouds.hearCameraInfo(*infos.begin());
     }
   }
@@ -225,17 +238,19 @@ struct BagReplay::Run {
   }
 };
 
-BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options)
-    : path_(bag), config_(std::move(config)), options_(std::move(options)) {
+BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagReplayOptions options)
+    : paths_(std::move(bags)), config_(std::move(config)), options_(std::move(options)) {
   // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
   config_.transform_timeout_s = 0;
   if (!options_.octomap_file.empty()) {
     config_.octomap_file = options_.octomap_file;
     config_.octomap_topic_named = config_.cloud_named = false;
   }
-  rosbag::Bag file;
-  openBag(path_, file);
-  rosbag::View view(file);
+  const OpenBags files(paths_);
+  paths_ = files.paths();
+  if (!options_.tf_static_file.empty()) lent_ = staticsOf(options_.tf_static_file);
+  rosbag::View view;
+  files.show(view);
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
     const bool is_new = topics_.emplace(c->topic, c->datatype).second;
     if (is_new && mapTypeProblem(c->datatype, c->md5sum).empty()) map_topics_.push_back(c->topic);
@@ -257,8 +272,36 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   }
   for (const auto& [topic, type] : topics_) there.push_back(topic + " (" + type + ")");
   if (!found) {
-    throw std::runtime_error(path_ + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
-                             "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused);
+    throw std::runtime_error(
+        bagsInWords(paths_) + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
+        "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused);
+  }
+  requireOneRun(files);
+}
+
+/// Of meshes that overlap nobody could tell which frame is where; a long pause is told.
+void BagReplay::requireOneRun(const OpenBags& bags) {
+  for (std::size_t i = 1; i < paths_.size(); ++i) {
+    const std::optional<BagSpan> before = spanOf(paths_[i - 1]), next = spanOf(paths_[i]);
+    if (!before || !next) continue;
+    if (const ros::Duration pause = next->begin - before->end; pause > LONG_PAUSE) {
+      pauses_.push_back("nothing was recorded for " + std::to_string(std::lround(pause.toSec())) + " s between " +
+                        paths_[i - 1] + " and " + paths_[i]);
+    }
+  }
+  for (const auto& [topic, type] : topics_) {
+    if (!findMeshType(type)) continue;
+    std::optional<std::pair<std::size_t, ros::Time>> last;  // the bag with the latest end
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      rosbag::View view(bags.bag(i), rosbag::TopicQuery(topic));
+      if (view.size() == 0) continue;
+      const ros::Time begin = view.getBeginTime(), end = view.getEndTime();
+      if (last && begin < last->second - ros::Duration(OUT_OF_ORDER_S)) {
+        throw std::runtime_error(paths_[last->first] + " and " + paths_[i] + " have " + topic +
+                                 " at the same time: they are no pieces of one run; analyse each by itself");
+      }
+      if (!last || end > last->second) last.emplace(i, end);
+    }
   }
 }
 
@@ -326,10 +369,10 @@ std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
          (more > 0 ? " and " + std::to_string(more) + " more" : "");
 }
 
-std::string BagReplay::firstMeshTopic(const std::string& bag, const std::vector<std::string>& clouds) {
-  rosbag::Bag file;
-  openBag(bag, file);
-  rosbag::View view(file);
+std::string BagReplay::firstMeshTopic(const std::vector<std::string>& bags, const std::vector<std::string>& clouds) {
+  const OpenBags files(bags);
+  rosbag::View view;
+  files.show(view);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
@@ -361,8 +404,15 @@ void BagReplay::tellMissing(Run& run) const {
     run.summary.not_looked_at.push_back(std::to_string(count) + " messages of other markers on " + topic +
                                         " were passed over");
   }
-  for (const std::string& sentence : {unusedMap(run.summary, may_use_map), unheardMeshes(run.summary)}) {
+  const std::string unused = unusedMap(run.summary, may_use_map);
+  for (const std::string& sentence : {unused, unheardMeshes(run.summary)}) {
     if (!sentence.empty()) run.summary.not_looked_at.push_back(sentence);
+  }
+  const bool lacks_map = !unused.empty() && may_use_map;
+  const auto missing_pieces =
+      run.repeats_latched ? std::vector<std::string>() : missingPieces(paths_, run.lacked_transform || lacks_map);
+  for (const auto& sentences : {missing_pieces, pauses_}) {
+    run.summary.not_looked_at.insert(run.summary.not_looked_at.end(), sentences.begin(), sentences.end());
   }
 }
 
@@ -373,14 +423,17 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
 
-  rosbag::View all(run.bag);
+  rosbag::View all;
+  run.bags.show(all);
   if (all.size() == 0) return run.summary;
+  run.repeats_latched = all.begin()->isLatching();
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
   if (!config_.octomap_file.empty() && may_use_map) {
     run.setMap(loadMapFile(config_.octomap_file, config_, &run.memory), 0);
   }
 
-  rosbag::View maps(run.bag, rosbag::TopicQuery(map_topics));
+  rosbag::View maps;
+  run.bags.show(maps, map_topics);
   bool first_is_taken = false;
   if (bag_maps && !config_.takesClouds() && maps.size() > 0) {
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
@@ -389,8 +442,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.hearFirstCameraInfos();
 
-  TransformWindow transforms(run.bag, run.feed);
-  ProgressBar progress(path_, all.size(), options_.show_progress);
+  TransformWindow transforms(run.bags, run.feed, lent_);
+  ProgressBar progress(bagsInWords(paths_), all.size(), options_.show_progress);
   ros::Time at = all.getBeginTime();
   for (const rosbag::MessageInstance& m : all) {
     at = m.getTime();
