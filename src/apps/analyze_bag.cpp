@@ -156,6 +156,7 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
   for (const std::string& sentence : summary.not_looked_at) facts.push_back({"not looked at", sentence});
   for (const std::string& c : summary.problems) facts.push_back({"complaint", c});
   report.setNotLookedAt(summary.not_looked_at);
+  report.setUnansweredEnd(summary.unanswered_end);
   report.setFacts(std::move(facts));
 }
 

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include <rosbag/view.h>
 
@@ -39,7 +41,8 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
   LoadedMap map;
   map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
   if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory);
-  if (map.stamp_ns == 0) map.stamp_ns = receiptOf(message);
+  map.receipt_ns = receiptOf(message);
+  if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
   return map;
 }
 
@@ -80,7 +83,8 @@ class BagClouds {
     std::vector<LoadedMap> maps;
     for (std::optional<CloudMessage>& one : held_) {
       if (!one || !clouds_.hasFrame()) continue;
-      maps.push_back(clouds_.add(*std::exchange(one, std::nullopt), [] { return false; }));
+      maps.push_back(clouds_.add(*one, [] { return false; }));
+      maps.back().receipt_ns = std::exchange(one, std::nullopt)->receipt_ns;
     }
     return maps;
   }
@@ -112,6 +116,7 @@ struct BagReplay::Run {
   BagReplaySummary summary;
   std::set<std::string> complained;
   bool lacked_transform = false;
+  std::vector<ros::Time> last_came;  // of each body, its last message; 0: none
   bool repeats_latched = false;      // as rosbag record --repeat-latched does at the begin of a piece
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
@@ -119,7 +124,8 @@ struct BagReplay::Run {
         predictions(predictions_to),
         variation(r.options_.variation),
         bags(r.paths_),
-        pipeline(r.config_, feed) {
+        pipeline(r.config_, feed),
+        last_came(r.config_.bodies.size()) {
     pipeline.setTopologyFilter(variation.topology);
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
@@ -232,9 +238,47 @@ struct BagReplay::Run {
     for (const std::size_t body : bodies) {
       const std::uint64_t before = pipeline.passedOver(body);
       mesh(body, message, bytes);
-      is_of_none = is_of_none && pipeline.passedOver(body) > before;
+      const bool is_other = pipeline.passedOver(body) > before;
+      if (!is_other) last_came[body] = message.getTime();
+      is_of_none = is_of_none && is_other;
     }
     if (is_of_none) ++passed_over[message.getTopic()];
+  }
+
+  /// How long a body moved on after the last frame of the clock body came [s]. One that tf carries: by the stamp of the
+  /// newest transform, but not beyond the bag's end.
+  double movesOn(std::size_t body, const ros::Time& end) const {
+    const std::size_t clock = pipeline.config().monitor.clock_body;
+    if (body == clock || pipeline.isStatic(body)) return 0;
+    const BodyConfig& config = pipeline.config().bodies[body];
+    if (!config.isRigid()) return (last_came[body] - last_came[clock]).toSec();
+    try {
+      const ros::Time newest =
+          transforms.lookupTransform(pipeline.fixedFrame(), config.tf_frame, ros::Time(0)).header.stamp;
+      return (std::min(newest, end) - last_came[clock]).toSec();
+    } catch (const tf2::TransformException&) {
+      return 0;  // the frames say what is missing
+    }
+  }
+
+  /// Of that time nothing is looked at: steps are those of the clock body. It counts where a pause between two frames
+  /// would be a gap.
+  void tellUnansweredEnd(const ros::Time& end) {
+    const std::size_t clock = pipeline.config().monitor.clock_body;
+    double most_s = 0;
+    std::size_t longest = clock;
+    for (std::size_t b = 0; b < last_came.size() && !last_came[clock].isZero(); ++b) {
+      if (const double s = movesOn(b, end); s > most_s) {
+        most_s = s;
+        longest = b;
+      }
+    }
+    if (!(most_s > pipeline.config().monitor.store.max_step_s)) return;
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(3) << "the frames of body '" << pipeline.config().bodies[clock].body.name
+         << "', each of which ends a step, end " << most_s << " s before those of body '"
+         << pipeline.config().bodies[longest].body.name << "': nothing of that time was looked at";
+    summary.unanswered_end = text.str();
   }
 };
 
@@ -470,6 +514,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.pipeline.finish();
   run.drain(at);
+  run.tellUnansweredEnd(at);
   tellMissing(run);
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.fixed_frame = run.pipeline.fixedFrame();

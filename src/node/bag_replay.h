@@ -40,6 +40,7 @@ struct BagReplaySummary {
   std::string map_source;             ///< its topic or file, and who named it, in words
   std::vector<std::string> problems;  ///< refused messages, each kind once; maps that are missing or not listened to
   std::vector<std::string> not_looked_at;  ///< a map that is not there, meshes that nobody listens to: a sentence each
+  std::string unanswered_end;              ///< that other bodies moved on where no frame came any more; empty: none did
   FrameCounters frames;
   EffectPlan effects;                          ///< at the end
   std::vector<LeftOutPair> left_out;           ///< at the end

@@ -169,6 +169,7 @@ void MapLoader::loop() {
     }
     LoadedMap map = load(job);
     map.arrival_ns = job.settles_ns;
+    map.receipt_ns = job.message.receipt_ns;
     if (map.stamp_ns == 0) map.stamp_ns = job.message.receipt_ns;
     if (!config_.takesClouds()) map.number = job.number;
     if (!map.surface) ++refused_;

@@ -164,6 +164,7 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   }
   if (!map.hint.empty() && map_hints_.insert(map.hint).second) map_hint_ = map.hint;
   map_slow_ = map.slow;
+  map_lead_.add(map.stamp_ns, map.receipt_ns);
   unplaced_maps_.push_back({std::move(map), now_ns});
   limitUnplacedMaps();
 }
@@ -259,6 +260,7 @@ void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
   for (Source& source : sources_) source.lead = {};
+  map_lead_ = {};
   learnAnew(status);
 }
 

@@ -27,8 +27,9 @@ namespace dccd {
 /// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
 /// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
 struct LoadedMap : ObstacleMap {
-  std::string hint;  ///< what looks like a mistake in what it was made of; empty: nothing does
-  std::string slow;  ///< that its making takes too long, and what to do; empty: it does not
+  StampNs receipt_ns = 0;  ///< on the clock of stamps; 0: it did not come from anywhere
+  std::string hint;        ///< what looks like a mistake in what it was made of; empty: nothing does
+  std::string slow;        ///< that its making takes too long, and what to do; empty: it does not
 };
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
@@ -204,6 +205,7 @@ class MonitorPipeline {
   std::deque<UnplacedMap> unplaced_maps_;  // oldest first
   std::optional<LoadedMap> trusted_map_;   // beside live ones
   bool trusted_placed_ = false;
+  StampLead map_lead_;
   std::int64_t settled_map_ns_ = 0, map_placed_ns_ = 0;  // arrival of the last one; when the last one got its place
   std::string map_hint_;                                 // to be told
   std::set<std::string> map_hints_;   // LoadedMap::hint, as far as they were told; there are a few for each source

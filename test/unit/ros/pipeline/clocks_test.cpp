@@ -102,6 +102,25 @@ TEST(ClocksOfTwoComputers, OfAFrameThatCarriesABody) {
   }
 }
 
+// A map is placed, and its voxels are told from bodies, by its stamp.
+TEST(ClocksOfTwoComputers, OfMaps) {
+  for (const auto& [ahead_s, alike] : {std::pair(0.0, true), {0.2, true}, {-5.0, true}, {2.0, false}}) {
+    Clocks cell(scene("octomap_topic: map, topic: cloth"));
+    LoadedMap map = decodeMapMessage(test::map(START_S + ahead_s), cell.config);
+    map.receipt_ns = at(0);
+    cell.pipeline.setMap(std::move(map), 0);
+    for (int i = 0; i <= 10; ++i) {
+      cell.takeOf(0, 0.1 * i, 0, 0.1f);
+      while (cell.pipeline.nextOutcome(0, cell.outcome)) continue;
+    }
+    ASSERT_TRUE(cell.outcome.answered) << ahead_s << " " << cell.outcome.reason;
+    const Assurance said = assuranceOf(cell.outcome);
+    EXPECT_EQ(said.proved, alike) << ahead_s << " " << describe(said);
+    if (!alike)
+      EXPECT_NE(describe(said).find("stamps of maps on map are up to 2 s later"), std::string::npos) << describe(said);
+  }
+}
+
 // The clock that was ahead is set: its stamps go back, and what it sent is forgotten.
 TEST(ClocksOfTwoComputers, UntilTheClockIsSet) {
   for (const bool is_one_sender : {true, false}) {
