@@ -316,9 +316,15 @@ BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagRep
   }
   for (const auto& [topic, type] : topics_) there.push_back(topic + " (" + type + ")");
   if (!found) {
+    const auto isMesh = [](const auto& topic) { return findMeshType(topic.second) != nullptr; };
+    const bool has_others_alone = !there.empty() && std::none_of(topics_.begin(), topics_.end(), isMesh);
     throw std::runtime_error(
         bagsInWords(paths_) + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
-        "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused);
+        "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused +
+        (has_others_alone ? "; points in messages of another type are to be published again in one "
+                            "of a mesh type: doc/messages.md, \"Messages of another type\", has "
+                            "the lines"
+                          : ""));
   }
   requireOneRun(files);
 }

@@ -147,5 +147,33 @@ class ExamplesTest(PythonTestCase):
         self.assertEqual((self.folder / 'contacts.png').read_bytes()[1:4], b'PNG')
 
 
+class OtherMessagesTest(PythonTestCase):
+    def test_the_lines_that_publish_points_again(self):
+        """Those of doc/messages.md, on a bag whose only points are in a type that nobody reads."""
+        import genpy
+        import rosbag
+        from geometry_msgs.msg import Point32, PolygonStamped
+        page = (CHECKOUT / 'doc/messages.md').read_text()
+        code = page.split('## Messages of another type')[1].split('```python\n')[1].split('```')[0]
+        self.assertLessEqual(len(code.splitlines()), 10)
+        with rosbag.Bag(str(self.folder / 'in.bag'), 'w') as bag:
+            for i in range(4):
+                message, at = PolygonStamped(), genpy.Time(1 + .1 * i)
+                message.header.stamp, message.header.frame_id = at, 'world'
+                message.polygon.points = [Point32(x, 0, .1 * i) for x in range(4)]
+                bag.write('/tracker/nodes', message, at)
+        given = self.folder / 'rope.yaml'
+        given.write_text('topology: {source: polyline}\n')
+        tool = [TOOLS / 'analyze_bag', '--report', self.folder / 'report', '--quiet', '--params', given]
+        ran = run(*tool, self.folder / 'in.bag')
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn('doc/messages.md, "Messages of another type"', ran.stderr)
+        (self.folder / 'again.py').write_text(code.replace('message.nodes', 'message.polygon.points'))
+        self.assertEqual(run(sys.executable, self.folder / 'again.py', cwd=self.folder).stderr, '')
+        ran = run(*tool, self.folder / 'out.bag')
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn('No contact in 3 answered steps', ran.stdout)
+
+
 if __name__ == '__main__':
     unittest.main()
