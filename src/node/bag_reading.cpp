@@ -231,14 +231,6 @@ OpenBags::OpenBags(const std::vector<std::string>& paths) : paths_(paths) {
   }
 }
 
-void OpenBags::show(rosbag::View& view) const {
-  for (const auto& bag : bags_) view.addQuery(*bag);
-}
-
-void OpenBags::show(rosbag::View& view, const std::vector<std::string>& topics) const {
-  for (const auto& bag : bags_) view.addQuery(*bag, rosbag::TopicQuery(topics));
-}
-
 tf2_msgs::TFMessage staticsOf(const std::string& path) {
   rosbag::Bag bag;
   openBag(path, bag);
@@ -264,11 +256,11 @@ tf2_msgs::TFMessage staticsOf(const std::string& path) {
 }
 
 TransformWindow::TransformWindow(const OpenBags& bags, TransformFeed& feed, const tf2_msgs::TFMessage& lent)
-    : feed_(feed) {
-  bags.show(view_, {"/tf"});
-  bags.show(statics_, {"/tf_static"});
-  next_ = view_.begin();
-  next_static_ = statics_.begin();
+    : feed_(feed),
+      view_(bags, {"/tf"}),
+      statics_(bags, {"/tf_static"}),
+      next_(view_.begin()),
+      next_static_(statics_.begin()) {
   std::set<std::string> known;
   for (const rosbag::MessageInstance& m : statics_) {
     const auto tf = read(m);

@@ -35,9 +35,14 @@ class OpenBags {
   /// In the order in which they begin; those without messages come last.
   const std::vector<std::string>& paths() const { return paths_; }
   const rosbag::Bag& bag(std::size_t i) const { return *bags_[i]; }
-  /// Fills an empty view.
-  void show(rosbag::View& view) const;
-  void show(rosbag::View& view, const std::vector<std::string>& topics) const;
+  struct View : rosbag::View {
+    explicit View(const OpenBags& bags) {
+      for (const auto& bag : bags.bags_) addQuery(*bag);
+    }
+    View(const OpenBags& bags, const std::vector<std::string>& topics) {
+      for (const auto& bag : bags.bags_) addQuery(*bag, rosbag::TopicQuery(topics));
+    }
+  };
 
  private:
   std::vector<std::string> paths_;
@@ -68,7 +73,7 @@ class TransformWindow {
   tf2_msgs::TFMessage::ConstPtr read(const rosbag::MessageInstance& message);
 
   TransformFeed& feed_;
-  rosbag::View view_, statics_;
+  OpenBags::View view_, statics_;
   rosbag::View::iterator next_, next_static_;
   tf2_msgs::TFMessage::ConstPtr waiting_;  // the message at next_, where it was read already
   std::map<std::size_t, StampNs> newest_mesh_;

@@ -189,8 +189,7 @@ struct BagReplay::Run {
   /// They are known from the start: a picture may come before its own.
   void hearFirstCameraInfos() {
     for (const std::string& topic : clouds.infoTopics()) {
-      rosbag::View infos;
-      bags.show(infos, {topic});
+      OpenBags::View infos(bags, {topic});
       if (infos.size() > 0) clouds.hearCameraInfo(*infos.begin());
     }
   }
@@ -293,8 +292,7 @@ BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagRep
   const OpenBags files(paths_);
   paths_ = files.paths();
   if (!options_.tf_static_file.empty()) lent_ = staticsOf(options_.tf_static_file);
-  rosbag::View view;
-  files.show(view);
+  OpenBags::View view(files);
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
     const bool is_new = topics_.emplace(c->topic, c->datatype).second;
     if (is_new && mapTypeProblem(c->datatype, c->md5sum).empty()) map_topics_.push_back(c->topic);
@@ -421,8 +419,7 @@ std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
 
 std::string BagReplay::firstMeshTopic(const std::vector<std::string>& bags, const std::vector<std::string>& clouds) {
   const OpenBags files(bags);
-  rosbag::View view;
-  files.show(view);
+  OpenBags::View view(files);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
@@ -473,8 +470,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
 
-  rosbag::View all;
-  run.bags.show(all);
+  OpenBags::View all(run.bags);
   if (all.size() == 0) return run.summary;
   run.repeats_latched = all.begin()->isLatching();
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
@@ -482,8 +478,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     run.setMap(loadMapFile(config_.octomap_file, config_, &run.memory), 0);
   }
 
-  rosbag::View maps;
-  run.bags.show(maps, map_topics);
+  OpenBags::View maps(run.bags, map_topics);
   bool first_is_taken = false;
   if (bag_maps && !config_.takesClouds() && maps.size() > 0) {
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
