@@ -7,7 +7,7 @@ import sqlite3
 SCHEMA = '''
 CREATE TABLE recordings (
   name TEXT PRIMARY KEY,
-  bag TEXT, bag_bytes INTEGER,
+  bag TEXT, bag_bytes INTEGER,  -- of several pieces a path a line
   state TEXT,                   -- proved, not proved, failed (it cannot be answered), missing
   headline TEXT, said TEXT,     -- the report's first sentence; what analyze_bag said of what is not proved, or failed
   frames INTEGER, answered INTEGER, unanswered_share REAL,
@@ -46,14 +46,14 @@ def insert(database, table, recording, row_list):
 def fill(database, fleet, folder, snakemake_version):
     database.executescript(SCHEMA)
     for recording, result in results_of(fleet, folder):
-        name = recording['name']
+        name, bags = recording['name'], '\n'.join(recording['bags'])
         if not result:
-            database.execute('INSERT INTO recordings (name, bag, state) VALUES (?, ?, ?)', (name, recording['bag'], 'missing'))
+            database.execute('INSERT INTO recordings (name, bag, state) VALUES (?, ?, ?)', (name, bags, 'missing'))
             continue
         tables = result.get('tables', {})
         database.execute(
             'INSERT INTO recordings VALUES (%s)' % ', '.join('?' * 14),
-            (name, recording['bag'], result['bag_bytes'], STATES[result['exit']], result['headline'], result['said'],
+            (name, bags, result['bag_bytes'], STATES[result['exit']], result['headline'], result['said'],
              tables.get('frames'), tables.get('answered'), tables.get('unanswered_share'), tables.get('duration_s'),
              tables.get('first_new_contact_s'), result['seconds'], result['max_memory_kb'],
              tables.get('contacts_sha256')))

@@ -27,7 +27,7 @@ def analyze(fleet, recording, folder):
     unfinished = folder.with_name(folder.name + '.part')
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.parent.mkdir(parents=True, exist_ok=True)
-    command = [fleet['tool'], recording['bag'], '--report', str(unfinished), '--quiet',
+    command = [fleet['tool'], *recording['bags'], '--report', str(unfinished), '--quiet',
                '--threads', str(fleet['threads']), *fleet['options']]
     start = time.time()
     ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
@@ -43,9 +43,9 @@ def analyze(fleet, recording, folder):
         unfinished.replace(folder)
     else:
         shutil.rmtree(unfinished, ignore_errors=True)
-    bag = os.stat(recording['bag'])
+    bag_bytes = sum(os.stat(bag).st_size for bag in recording['bags'])
     return {'exit': ran.returncode, 'said': said, 'headline': ran.stdout.decode(errors='replace').split('\n')[0],
-            'seconds': round(time.time() - start, 3), 'bag_bytes': bag.st_size, 'version': fleet['version'],
+            'seconds': round(time.time() - start, 3), 'bag_bytes': bag_bytes, 'version': fleet['version'],
             'max_memory_kb': resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss}
 
 
@@ -53,7 +53,7 @@ def compute_recording(fleet, name):
     recording = next(r for r in fleet['recordings'] if r['name'] == name)
     folder = pathlib.Path('recordings', name)
     result = analyze(fleet, recording, folder / 'report')
-    result.update({'name': name, 'bag': recording['bag']})
+    result.update({'name': name, 'bags': recording['bags']})
     if result['exit'] in ANSWERED:
         result['tables'] = fleet_tables.of_report(folder / 'report')
     fleet_database.write_whole(folder / 'result.json', json.dumps(result, indent=1) + '\n')

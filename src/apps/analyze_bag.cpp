@@ -1,4 +1,5 @@
-// analyze_bag IN.bag [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a master.
+// analyze_bag IN.bag... [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a
+// master.
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
@@ -12,6 +13,7 @@
 #include "apps/analyze_bag/study_runner.h"
 #include "apps/decimal_options.h"
 #include "dccd/monitor_extras.h"
+#include "node/bag_pieces.h"
 #include "node/bag_replay.h"
 #include "node/robot_source.h"
 #include "report/report.h"
@@ -29,10 +31,11 @@ constexpr int ERROR = 1, NOT_PROVED = 3;
 #endif
 
 struct Arguments {
-  std::string bag, out, report, params, octomap, accuracy, mesh, robot, command;
+  std::vector<std::string> bags;
+  std::string out, report, params, octomap, tf_static, accuracy, mesh, robot, command;
   double look_ahead_s = 0;
   int threads = 0;
-  bool without_map = false, study = false, quiet = false;
+  bool without_map = false, study = false, quiet = false, pieces = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -49,7 +52,7 @@ MonitorConfig configure(const Arguments& a) {
     for (ParameterTree& one : copy.members["obstacle_cloud_topics"].items) {
       clouds.push_back(one.kind == ParameterTree::Kind::TEXT ? one.text : one.members["topic"].text);
     }
-    const std::string topic = BagReplay::firstMeshTopic(a.bag, clouds);
+    const std::string topic = BagReplay::firstMeshTopic(a.bags, clouds);
     if (!topic.empty()) tree.put("topic", topic);
   }
   if (a.without_map) {
@@ -134,8 +137,10 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
   report.setCounters(summary.frames);
   std::string topics;
   for (const std::string& t : summary.mesh_topics) topics += (topics.empty() ? "" : ", ") + (t.empty() ? "(rigid)" : t);
+  std::string bags;
+  for (const std::string& bag : a.bags) bags += (bags.empty() ? "" : ", ") + bag;
   std::vector<std::pair<std::string, std::string>> facts{
-      {"bag", a.bag},
+      {"bag", bags},
       {"command", a.command},
       {"program", "deformable_ccd " DEFORMABLE_CCD_VERSION ", compiled by " COMPILER},
       {"parameters", a.params.empty() ? "the defaults, and what the command says" : textOf(a.params)},
@@ -151,6 +156,7 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
   for (const std::string& sentence : summary.not_looked_at) facts.push_back({"not looked at", sentence});
   for (const std::string& c : summary.problems) facts.push_back({"complaint", c});
   report.setNotLookedAt(summary.not_looked_at);
+  report.setUnansweredEnd(summary.unanswered_end);
   report.setFacts(std::move(facts));
 }
 
@@ -180,14 +186,17 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
 }
 
 int analyze(const Arguments& a) {
-  for (const std::string& input : {a.bag, a.params, a.octomap, a.robot}) refuseToOverwrite(input, {a.out});
+  for (const std::string& bag : a.bags) refuseToOverwrite(bag, {a.out});
+  for (const std::string& input : {a.params, a.octomap, a.robot, a.tf_static}) refuseToOverwrite(input, {a.out});
   const MonitorConfig config = configure(a);
   BagReplayOptions options;
   options.octomap_file = a.octomap;
+  options.tf_static_file = a.tf_static;
   options.show_progress = !a.quiet;
-  BagReplay replay(a.bag, config, options);
+  BagReplay replay(a.bags, config, options);
   Report report(a.report);  // makes the folder, in which the results may lie, too
-  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out);
+  std::unique_ptr<ResultBag> out =
+      a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, replay.lentTransforms());
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
@@ -208,7 +217,7 @@ int analyze(const Arguments& a) {
   std::string study_line;
   if (a.study) {  // takes long, and what there is should not be lost with it
     out.reset();
-    const AccuracyStudy study = runStudy(a.bag, config, options);
+    const AccuracyStudy study = runStudy(a.bags, config, options);
     study.write(a.report + "/study.csv");
     report.setStudy(study.json());
     report.finish();
@@ -222,15 +231,19 @@ int analyze(const Arguments& a) {
 int main(int argc, char** argv) {
   CLI::App app{"Contacts of a recorded run, with a report"};
   Arguments a;
-  app.add_option("BAG", a.bag, "bag to analyse")->required()->check(CLI::ExistingFile);
+  app.add_option("BAG", a.bags, "bag to analyse; several: the pieces of one run, as by rosbag record --split")
+      ->required()
+      ->check(CLI::ExistingFile);
   app.add_option("-o,--output", a.out, "write a bag with the input and the results");
-  app.add_option("--report", a.report, "folder for the report")->required();
+  auto* report = app.add_option("--report", a.report, "folder for the report");
   app.add_option("--params", a.params, "YAML file with the node's parameters")->check(CLI::ExistingFile);
   app.add_option("--mesh", a.mesh,
                  "mesh topic, in place of the parameters'; the first one of the bag if neither names one");
   app.add_option("--robot", a.robot, "URDF file of a robot, whose links tf carries")->check(CLI::ExistingFile);
   auto* octomap =
       app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
+  app.add_option("--tf-static", a.tf_static, "bag whose /tf_static holds for frames that have none in the others")
+      ->check(CLI::ExistingFile);
   app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")
       ->excludes(octomap);
   app.add_option("--accuracy", a.accuracy, "exact, or conservative for distances");
@@ -241,6 +254,8 @@ int main(int argc, char** argv) {
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
                "does to first contacts");
   app.add_flag("--quiet", a.quiet, "no progress");
+  app.add_flag("--list-pieces", a.pieces, "only say, as JSON, which of the bags are pieces of one run")
+      ->excludes(report);
   app.footer(
       "Exit status:\n"
       "  0  every step is proved: what does not touch is known not to\n"
@@ -249,6 +264,11 @@ int main(int argc, char** argv) {
   try {
     requireDecimalNumbers(app);
     app.parse(argc, argv);
+    if (a.pieces) {
+      std::cout << nlohmann::json(groupedByRun(a.bags)) << '\n';
+      return 0;
+    }
+    if (report->empty()) throw CLI::RequiredError("--report");
     a.command = commandLine(argc, argv);
     return analyze(a);
   } catch (const CLI::ParseError& e) {

@@ -1,5 +1,5 @@
-// check_step FRAME FRAME...: the contacts of the steps between mesh files of the same topology. Ends with 0 when what
-// it says is proved (contacts or none), with 3 when it is not, with 1 on an error.
+// check_step FRAME FRAME...: the contacts of the steps between mesh files of the same topology, or between the frames
+// of an array. Ends with 0 when what it says is proved (contacts or none), with 3 when it is not, with 1 on an error.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "dccd/detect.h"
 #include "dccd/monitor_extras.h"
 #include "input/mesh_formats.h"
+#include "input/npy_file.h"
 #include "report/progress_bar.h"
 #include "stream/quantile.h"
 
@@ -28,20 +29,22 @@ constexpr int NOT_PROVED = 3;  // CLI11 and this program's own errors have other
 
 struct Arguments {
   std::vector<std::string> frames;
-  std::string contacts, stats;
+  std::string topology, contacts, stats;
   std::string accuracy = "exact", simd = "auto";
   double tolerance_m = AccuracyOptions().tolerance_m, budget_ms = 0;
   int toc_bits = AccuracyOptions().toc_bits, threads = 1, repeat = 1;
   bool no_start_state = false, earliest_only = false, forget = false;
-  bool isSequence() const { return frames.size() > 2; }
 };
 
 Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
-  app.add_option("FRAME", a.frames,
-                 "meshes with the same faces, two or more, each a step after the one before (.ply, .obj, .stl, .dae)")
+  app.add_option(
+         "FRAME", a.frames,
+         "meshes with the same faces, two or more, each a step after the one before (.ply, .obj, .stl, .dae); or "
+         ".npy of frames x vertices x 3")
       ->required()
-      ->expected(2, -1);
+      ->expected(1, -1);
+  app.add_option("--topology", a.topology, "mesh file that has the faces, or the lines, of an .npy");
   app.add_option("--contacts", a.contacts, "write the contacts as CSV, of several steps with the step first, from 0");
   app.add_option("--stats", a.stats, "write pairs and milliseconds per stage as JSON");
   app.add_option("--accuracy", a.accuracy, "conservative or exact")->capture_default_str();
@@ -131,9 +134,9 @@ struct Run {
   }
 };
 
-Options optionsOf(const Arguments& a) {
+Options optionsOf(const Arguments& a, bool is_sequence) {
   Options options;
-  options.keep_bounds = a.isSequence() && !a.forget;  // else the same step again and again
+  options.keep_bounds = is_sequence && !a.forget;  // else the same step again and again
   options.accuracy.rung = accuracyFromString(a.accuracy.c_str());
   options.accuracy.tolerance_m = a.tolerance_m;
   options.accuracy.toc_bits = a.toc_bits;
@@ -190,8 +193,9 @@ void hint(const std::string& path, const std::string& text) {
 }
 
 std::string sizesOf(const MeshFile& frame) {
-  return std::to_string(frame.positions.size()) + " vertices, " + std::to_string(frame.polygons.size()) +
-         " faces and " + std::to_string(frame.edges.size()) + " edges of lines";
+  const std::string parts = frame.edges.empty() ? std::to_string(frame.polygons.size()) + " faces"
+                                                : std::to_string(frame.edges.size()) + " edges of lines";
+  return std::to_string(frame.positions.size()) + " vertices and " + parts;
 }
 
 /// A name without its numbers, and these: how many digits, without zeros before them, and which.
@@ -258,8 +262,39 @@ std::vector<MeshFile> framesOf(const std::vector<std::string>& paths) {
   return frames;
 }
 
+bool isArray(const std::string& path) { return fileEnding(path) == "npy"; }
+
+/// Arrays have positions alone: all else is the topology's.
+std::vector<MeshFile> framesOfArrays(const Arguments& a) {
+  const auto other = std::find_if_not(a.frames.begin(), a.frames.end(), isArray);
+  if (other != a.frames.end()) {
+    throw std::runtime_error(*other + ": is no .npy; --topology gives faces to arrays, and frames are all of one kind");
+  }
+  if (a.topology.empty()) {
+    throw std::runtime_error(a.frames[0] + ": an array has no faces; name a mesh file of these vertices by --topology");
+  }
+  MeshFile mesh = loadMeshFile(a.topology);
+  if (mesh.is_soup) throw std::runtime_error(a.topology + ": does not number its vertices; take an OBJ or PLY");
+  for (const std::string& text : mesh.hints) hint(a.topology, text);
+  std::vector<MeshFile> frames;
+  for (const std::string& path : a.frames) {
+    for (Positions& positions : loadNpyFrames(path)) {
+      if (positions.size() != mesh.positions.size()) {
+        throw std::runtime_error(path + ": has " + std::to_string(positions.size()) + " vertices, and " + a.topology +
+                                 " has " + std::to_string(mesh.positions.size()));
+      }
+      mesh.positions = std::move(positions);
+      frames.push_back(frames.empty() ? mesh : MeshFile());
+      frames.back().positions = mesh.positions;
+    }
+  }
+  return frames;
+}
+
 std::vector<Step> stepsOf(const Arguments& a) {
-  const std::vector<MeshFile> frames = framesOf(a.frames);
+  const bool has_arrays = !a.topology.empty() || std::any_of(a.frames.begin(), a.frames.end(), isArray);
+  const std::vector<MeshFile> frames = has_arrays ? framesOfArrays(a) : framesOf(a.frames);
+  if (frames.size() < 2) throw std::runtime_error(a.frames[0] + ": is one frame; a step needs two");
   const MeshFile& first = frames[0];
   Step step;
   step.bodies.resize(1);
@@ -279,11 +314,12 @@ std::vector<Step> stepsOf(const Arguments& a) {
 
 int checkStep(const Arguments& a) {
   for (const std::string& frame : a.frames) refuseToOverwrite(frame, {a.contacts, a.stats});
+  refuseToOverwrite(a.topology, {a.contacts, a.stats});
   requireOrder(a.frames);
   setSimdTarget(a.simd);
   const std::vector<Step> steps = stepsOf(a);
   Run run;
-  run.options = optionsOf(a);
+  run.options = optionsOf(a, steps.size() > 1);
   {
     ProgressBar progress("steps", static_cast<std::size_t>(a.repeat) * steps.size());
     for (int i = 0; i < a.repeat; ++i) run.once(steps, progress);

@@ -26,7 +26,7 @@ struct MeshFile {
   std::vector<Face> faces;             ///< as facesOf() makes them of the file's polygons
   FaceGroups groups;                   ///< of an OBJ
   Polygons polygons;                   ///< as the file has them
-  std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face
+  std::vector<std::size_t> unchecked;  ///< polygons that lie in no face; behind the last: what may be one
   std::vector<Edge> edges;             ///< of ropes: lines of an OBJ, edges of a PLY, which then have no faces
   std::vector<std::string> hints;      ///< sentences about what was skipped, for the user to see
   bool is_soup = false;                ///< vertices are corners of equal coordinates, not what the file numbers

@@ -152,7 +152,7 @@ class PlyReader {
       const auto strip = std::upper_bound(strips.begin(), strips.end(), p) - strips.begin();
       return "a triangle of strip " + std::to_string(strip);
     };
-    hintAtUnchecked(name, mesh_);
+    addUnreadRows(name);
     return std::move(mesh_);
   }
 
@@ -210,11 +210,41 @@ class PlyReader {
     }
   }
 
+  /// Integers in a list may be a face's corners, whatever the element is called. A scanner's grid is known to hold
+  /// pixels.
   void skip(const Element& element, PlyBody& body) {
-    forRows(
-        element, body, [&](std::size_t p) { skipValue(element.properties[p], body); }, [] {});
+    const bool may_hold_faces = element.name != "range_grid";
+    const std::size_t rows_before = unread_rows_.size();
+    std::uint64_t row = 0;
+    bool is_unread = false;
+    const auto take = [&](std::size_t p) {
+      const Property& property = element.properties[p];
+      if (!property.count_type) return body.skip(property.type, 1);
+      const std::uint64_t count = countOf(property, body);
+      body.skip(property.type, count);
+      is_unread = is_unread || (may_hold_faces && isInteger(property.type) && count > 0);
+    };
+    forRows(element, body, take, [&] {
+      if (std::exchange(is_unread, false)) unread_rows_.push_back({&element, row});
+      ++row;
+    });
     if (element.count == 0) return;
-    mesh_.hints.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) + ") is skipped");
+    mesh_.hints.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) + ") is skipped" +
+                          (unread_rows_.size() > rows_before ? ", though its lists of integers may be faces" : ""));
+  }
+
+  /// They are unchecked, as polygons that cannot be used are, and have the numbers after those of the polygons.
+  void addUnreadRows(const std::function<std::string(std::size_t)>& name_of_polygon) {
+    const std::size_t polygons = mesh_.polygons.size();
+    std::vector<std::string> names;
+    for (const UnreadRow& unread : unread_rows_) {
+      mesh_.unchecked.push_back(polygons + names.size());
+      names.push_back("row " + std::to_string(unread.row) + " of element " + inQuotes(unread.element->name));
+    }
+    const auto name = [name_of_polygon, polygons, names = std::move(names)](std::size_t p) {
+      return p < polygons ? name_of_polygon(p) : names[p - polygons];
+    };
+    hintAtUnchecked(name, mesh_);
   }
 
   /// The place of the one property of one of these names.
@@ -318,6 +348,11 @@ class PlyReader {
   std::size_t faces_begin_ = 0, faces_end_ = 0;  // of the element `face` among the polygons
   std::vector<std::size_t> strip_ends_;          // of each strip among the polygons
   std::vector<Index> corners_;
+  struct UnreadRow {
+    const Element* element;
+    std::uint64_t row;
+  };
+  std::vector<UnreadRow> unread_rows_;  // of elements that are skipped
 };
 
 }  // namespace

@@ -29,6 +29,23 @@ class BagCheck {
  public:
   explicit BagCheck(const std::string& path) : file_(path, std::ios::binary), size_(std::filesystem::file_size(path)) {}
 
+  /// By what the index says of each chunk.
+  std::optional<BagSpan> span() {
+    if (textAt(0, std::min<std::uint64_t>(size_, MARK_OF_2.size())) != MARK_OF_2) return std::nullopt;
+    const Record first = recordAt(MARK_OF_2.size(), size_);
+    std::optional<BagSpan> span;
+    std::uint64_t left = number<std::uint32_t>(first, "conn_count");
+    left += number<std::uint32_t>(first, "chunk_count");
+    for (auto at = number<std::uint64_t>(first, "index_pos"); left > 0 && at > 0 && at < size_; --left) {
+      const Record record = recordAt(at, size_);
+      at = record.end;
+      if (record.op() != CHUNK_INFO || number<std::uint32_t>(record, "count") == 0) continue;
+      const ros::Time begin = time(record, "start_time"), end = time(record, "end_time");
+      span = span ? BagSpan{std::min(span->begin, begin), std::max(span->end, end)} : BagSpan{begin, end};
+    }
+    return span;
+  }
+
   /// Throws rosbag::BagFormatException naming the first byte of a record that is none.
   void check() {
     if (textAt(0, std::min<std::uint64_t>(size_, MARK_OF_2.size())) != MARK_OF_2) return;
@@ -134,6 +151,10 @@ class BagCheck {
     std::memcpy(&value, bytes.data(), sizeof value);
     return value;
   }
+  static ros::Time time(const Record& record, const std::string& name) {
+    const auto both = number<std::uint64_t>(record, name);
+    return {static_cast<std::uint32_t>(both), static_cast<std::uint32_t>(both >> 32)};
+  }
   std::set<std::uint32_t> messagesIn(const Record& chunk) {
     std::set<std::uint32_t> places;
     for (std::uint64_t at = chunk.data; at < chunk.end;) {
@@ -178,10 +199,66 @@ void openBag(const std::string& path, rosbag::Bag& bag) {
   }
 }
 
-TransformWindow::TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
+std::optional<BagSpan> spanOf(const std::string& path) {
+  if (!regularFileProblem(path).empty()) return std::nullopt;
+  try {
+    return BagCheck(path).span();
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
+OpenBags::OpenBags(const std::vector<std::string>& paths) : paths_(paths) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    std::error_code error;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (std::filesystem::equivalent(paths[i], paths[j], error))
+        throw std::runtime_error(paths[i] + ": is given twice");
+    }
+  }
+  if (paths.size() > 1) {
+    std::map<std::string, ros::Time> begins;
+    for (const std::string& path : paths) {
+      const std::optional<BagSpan> span = spanOf(path);
+      begins[path] = span ? span->begin : ros::TIME_MAX;
+    }
+    std::stable_sort(paths_.begin(), paths_.end(),
+                     [&](const std::string& a, const std::string& b) { return begins[a] < begins[b]; });
+  }
+  for (const std::string& path : paths_) {
+    bags_.push_back(std::make_unique<rosbag::Bag>());
+    openBag(path, *bags_.back());
+  }
+}
+
+tf2_msgs::TFMessage staticsOf(const std::string& path) {
+  rosbag::Bag bag;
+  openBag(path, bag);
+  rosbag::View view(bag, rosbag::TopicQuery("/tf_static"));
+  std::map<std::string, geometry_msgs::TransformStamped> found;
+  for (const rosbag::MessageInstance& m : view) {
+    const auto tf = m.isType<tf2_msgs::TFMessage>() ? m.instantiate<tf2_msgs::TFMessage>() : nullptr;
+    if (!tf) throw std::runtime_error(path + ": its /tf_static holds " + m.getDataType() + ", which is not read");
+    for (const auto& one : tf->transforms) {
+      const auto [known, is_new] = found.try_emplace(one.child_frame_id, one);
+      if (is_new ||
+          (known->second.transform == one.transform && known->second.header.frame_id == one.header.frame_id)) {
+        continue;
+      }
+      throw std::runtime_error(path + ": its /tf_static has '" + one.child_frame_id +
+                               "' at two places; which one is meant cannot be known");
+    }
+  }
+  if (found.empty()) throw std::runtime_error(path + ": has no /tf_static");
+  tf2_msgs::TFMessage all;
+  for (auto& one : found) all.transforms.push_back(std::move(one.second));
+  return all;
+}
+
+TransformWindow::TransformWindow(const OpenBags& bags, TransformFeed& feed, const tf2_msgs::TFMessage& lent)
     : feed_(feed),
-      view_(bag, rosbag::TopicQuery("/tf")),
-      statics_(bag, rosbag::TopicQuery("/tf_static")),
+      view_(bags, {"/tf"}),
+      statics_(bags, {"/tf_static"}),
       next_(view_.begin()),
       next_static_(statics_.begin()) {
   std::set<std::string> known;
@@ -194,6 +271,11 @@ TransformWindow::TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
     }
     feed_.add(firsts, true);
   }
+  tf2_msgs::TFMessage others;
+  for (const auto& transform : lent.transforms) {
+    if (known.count(transform.child_frame_id) == 0) others.transforms.push_back(transform);
+  }
+  feed_.add(others, true);
 }
 
 tf2_msgs::TFMessage::ConstPtr TransformWindow::read(const rosbag::MessageInstance& message) {

@@ -1,9 +1,12 @@
 #include "node/bag_replay.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iomanip>
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include <rosbag/view.h>
 
@@ -12,7 +15,7 @@
 #include "input/message_type.h"
 #include "input/short_text.h"
 #include "input/transforms.h"
-#include "node/bag_reading.h"
+#include "node/bag_pieces.h"
 #include "octomap/coarser.h"
 #include "output/output_messages.h"
 #include "report/progress_bar.h"
@@ -21,8 +24,15 @@ namespace dccd {
 namespace {
 
 constexpr std::size_t MOST_NAMES = 6;
+// A longer pause than this between two bags is told.
+const ros::Duration LONG_PAUSE(10.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
+
+/// As the words of an error begin.
+std::string bagsInWords(const std::vector<std::string>& paths) {
+  return paths.front() + (paths.size() == 1 ? "" : " and " + std::to_string(paths.size() - 1) + " more");
+}
 
 StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
 
@@ -92,7 +102,7 @@ struct BagReplay::Run {
   const Sink& sink;
   const Sink& predictions;
   const Variation& variation;
-  rosbag::Bag bag;
+  const OpenBags bags;
   tf2::BufferCore transforms{TransformWindow::length()};
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
@@ -105,10 +115,16 @@ struct BagReplay::Run {
   BagReplaySummary summary;
   std::set<std::string> complained;
   bool lacked_transform = false;
+  std::vector<ros::Time> last_came;  // of each body, its last message; 0: none
+  bool repeats_latched = false;      // as rosbag record --repeat-latched does at the begin of a piece
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
-      : sink(to), predictions(predictions_to), variation(r.options_.variation), pipeline(r.config_, feed) {
-    openBag(r.path_, bag);
+      : sink(to),
+        predictions(predictions_to),
+        variation(r.options_.variation),
+        bags(r.paths_),
+        pipeline(r.config_, feed),
+        last_came(r.config_.bodies.size()) {
     pipeline.setTopologyFilter(variation.topology);
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
@@ -172,7 +188,7 @@ struct BagReplay::Run {
   /// They are known from the start: a picture may come before its own.
   void hearFirstCameraInfos() {
     for (const std::string& topic : clouds.infoTopics()) {
-      rosbag::View infos(bag, rosbag::TopicQuery(topic));
+      OpenBags::View infos(bags, {topic});
       if (infos.size() > 0) clouds.hearCameraInfo(*infos.begin());
     }
   }
@@ -226,23 +242,62 @@ struct BagReplay::Run {
     for (const std::size_t body : bodies) {
       const std::uint64_t before = pipeline.passedOver(body);
       mesh(body, message, bytes);
-      is_of_none = is_of_none && pipeline.passedOver(body) > before;
+      const bool is_other = pipeline.passedOver(body) > before;
+      if (!is_other) last_came[body] = message.getTime();
+      is_of_none = is_of_none && is_other;
     }
     if (is_of_none) ++passed_over[message.getTopic()];
   }
+
+  /// How long a body moved on after the last frame of the clock body came [s]. One that tf carries: by the stamp of the
+  /// newest transform, but not beyond the bag's end.
+  double movesOn(std::size_t body, const ros::Time& end) const {
+    const std::size_t clock = pipeline.config().monitor.clock_body;
+    if (body == clock || pipeline.isStatic(body)) return 0;
+    const BodyConfig& config = pipeline.config().bodies[body];
+    if (!config.isRigid()) return (last_came[body] - last_came[clock]).toSec();
+    try {
+      const ros::Time newest =
+          transforms.lookupTransform(pipeline.fixedFrame(), config.tf_frame, ros::Time(0)).header.stamp;
+      return (std::min(newest, end) - last_came[clock]).toSec();
+    } catch (const tf2::TransformException&) {
+      return 0;  // the frames say what is missing
+    }
+  }
+
+  /// Of that time nothing is looked at: steps are those of the clock body. It counts where a pause between two frames
+  /// would be a gap.
+  void tellUnansweredEnd(const ros::Time& end) {
+    const std::size_t clock = pipeline.config().monitor.clock_body;
+    double most_s = 0;
+    std::size_t longest = clock;
+    for (std::size_t b = 0; b < last_came.size() && !last_came[clock].isZero(); ++b) {
+      if (const double s = movesOn(b, end); s > most_s) {
+        most_s = s;
+        longest = b;
+      }
+    }
+    if (!(most_s > pipeline.config().monitor.store.max_step_s)) return;
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(3) << "the frames of body '" << pipeline.config().bodies[clock].body.name
+         << "', each of which ends a step, end " << most_s << " s before those of body '"
+         << pipeline.config().bodies[longest].body.name << "': nothing of that time was looked at";
+    summary.unanswered_end = text.str();
+  }
 };
 
-BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options)
-    : path_(bag), config_(std::move(config)), options_(std::move(options)) {
+BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagReplayOptions options)
+    : paths_(std::move(bags)), config_(std::move(config)), options_(std::move(options)) {
   // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
   config_.transform_timeout_s = 0;
   if (!options_.octomap_file.empty()) {
     config_.octomap_file = options_.octomap_file;
     config_.octomap_topic_named = config_.cloud_named = false;
   }
-  rosbag::Bag file;
-  openBag(path_, file);
-  rosbag::View view(file);
+  const OpenBags files(paths_);
+  paths_ = files.paths();
+  if (!options_.tf_static_file.empty()) lent_ = staticsOf(options_.tf_static_file);
+  OpenBags::View view(files);
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
     const bool is_new = topics_.emplace(c->topic, c->datatype).second;
     if (is_new && mapTypeProblem(c->datatype, c->md5sum).empty()) map_topics_.push_back(c->topic);
@@ -264,8 +319,42 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   }
   for (const auto& [topic, type] : topics_) there.push_back(topic + " (" + type + ")");
   if (!found) {
-    throw std::runtime_error(path_ + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
-                             "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused);
+    const auto isMesh = [](const auto& topic) { return findMeshType(topic.second) != nullptr; };
+    const bool has_others_alone = !there.empty() && std::none_of(topics_.begin(), topics_.end(), isMesh);
+    throw std::runtime_error(
+        bagsInWords(paths_) + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
+        "; the bag has " + (there.empty() ? "no messages" : listOf(there)) + refused +
+        (has_others_alone ? "; points in messages of another type are to be published again in one "
+                            "of a mesh type: doc/messages.md, \"Messages of another type\", has "
+                            "the lines"
+                          : ""));
+  }
+  requireOneRun(files);
+}
+
+/// Of meshes that overlap nobody could tell which frame is where; a long pause is told.
+void BagReplay::requireOneRun(const OpenBags& bags) {
+  for (std::size_t i = 1; i < paths_.size(); ++i) {
+    const std::optional<BagSpan> before = spanOf(paths_[i - 1]), next = spanOf(paths_[i]);
+    if (!before || !next) continue;
+    if (const ros::Duration pause = next->begin - before->end; pause > LONG_PAUSE) {
+      pauses_.push_back("nothing was recorded for " + std::to_string(std::lround(pause.toSec())) + " s between " +
+                        paths_[i - 1] + " and " + paths_[i]);
+    }
+  }
+  for (const auto& [topic, type] : topics_) {
+    if (!findMeshType(type)) continue;
+    std::optional<std::pair<std::size_t, ros::Time>> last;  // the bag with the latest end
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      rosbag::View view(bags.bag(i), rosbag::TopicQuery(topic));
+      if (view.size() == 0) continue;
+      const ros::Time begin = view.getBeginTime(), end = view.getEndTime();
+      if (last && begin < last->second - ros::Duration(OUT_OF_ORDER_S)) {
+        throw std::runtime_error(paths_[last->first] + " and " + paths_[i] + " have " + topic +
+                                 " at the same time: they are no pieces of one run; analyse each by itself");
+      }
+      if (!last || end > last->second) last.emplace(i, end);
+    }
   }
 }
 
@@ -333,10 +422,9 @@ std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
          (more > 0 ? " and " + std::to_string(more) + " more" : "");
 }
 
-std::string BagReplay::firstMeshTopic(const std::string& bag, const std::vector<std::string>& clouds) {
-  rosbag::Bag file;
-  openBag(bag, file);
-  rosbag::View view(file);
+std::string BagReplay::firstMeshTopic(const std::vector<std::string>& bags, const std::vector<std::string>& clouds) {
+  const OpenBags files(bags);
+  OpenBags::View view(files);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
@@ -368,8 +456,15 @@ void BagReplay::tellMissing(Run& run) const {
     run.summary.not_looked_at.push_back(std::to_string(count) + " messages of other markers on " + topic +
                                         " were passed over");
   }
-  for (const std::string& sentence : {unusedMap(run.summary, may_use_map), unheardMeshes(run.summary)}) {
+  const std::string unused = unusedMap(run.summary, may_use_map);
+  for (const std::string& sentence : {unused, unheardMeshes(run.summary)}) {
     if (!sentence.empty()) run.summary.not_looked_at.push_back(sentence);
+  }
+  const bool lacks_map = !unused.empty() && may_use_map;
+  const auto missing_pieces =
+      run.repeats_latched ? std::vector<std::string>() : missingPieces(paths_, run.lacked_transform || lacks_map);
+  for (const auto& sentences : {missing_pieces, pauses_}) {
+    run.summary.not_looked_at.insert(run.summary.not_looked_at.end(), sentences.begin(), sentences.end());
   }
 }
 
@@ -380,14 +475,15 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
 
-  rosbag::View all(run.bag);
+  OpenBags::View all(run.bags);
   if (all.size() == 0) return run.summary;
+  run.repeats_latched = all.begin()->isLatching();
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
   if (!config_.octomap_file.empty() && may_use_map) {
     run.setMap(loadMapFile(config_.octomap_file, config_, &run.memory), 0);
   }
 
-  rosbag::View maps(run.bag, rosbag::TopicQuery(map_topics));
+  OpenBags::View maps(run.bags, map_topics);
   bool first_is_taken = false;
   if (bag_maps && !config_.takesClouds() && maps.size() > 0) {
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
@@ -396,8 +492,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.hearFirstCameraInfos();
 
-  TransformWindow transforms(run.bag, run.feed);
-  ProgressBar progress(path_, all.size(), options_.show_progress);
+  TransformWindow transforms(run.bags, run.feed, lent_);
+  ProgressBar progress(bagsInWords(paths_), all.size(), options_.show_progress);
   ros::Time at = all.getBeginTime();
   for (const rosbag::MessageInstance& m : all) {
     at = m.getTime();
@@ -424,6 +520,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.pipeline.finish();
   run.drain(at);
+  run.tellUnansweredEnd(at);
   tellMissing(run);
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.fixed_frame = run.pipeline.fixedFrame();

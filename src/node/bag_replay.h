@@ -1,5 +1,5 @@
-// A bag through the monitor without a master: the same pipeline as the node's, driven by the bag's clock, nothing
-// dropped.
+// A bag, or the pieces of one, through the monitor without a master: the same pipeline as the node's, driven by the
+// bag's clock, nothing dropped.
 #pragma once
 
 #include <functional>
@@ -11,6 +11,7 @@
 #include <ros/time.h>
 #include <rosbag/bag.h>
 
+#include "node/bag_reading.h"
 #include "node/map_loader.h"
 #include "node/monitor_pipeline.h"
 #include "report/look_ahead_score.h"
@@ -25,7 +26,8 @@ struct Variation {
 };
 
 struct BagReplayOptions {
-  std::string octomap_file;  ///< instead of the bag's maps; empty: none
+  std::string octomap_file;    ///< instead of the bag's maps; empty: none
+  std::string tf_static_file;  ///< a bag whose /tf_static holds for frames that have none in this one; empty: none
   bool show_progress = false;
   Variation variation;
 };
@@ -38,6 +40,7 @@ struct BagReplaySummary {
   std::string map_source;             ///< its topic or file, and who named it, in words
   std::vector<std::string> problems;  ///< refused messages, each kind once; maps that are missing or not listened to
   std::vector<std::string> not_looked_at;  ///< a map that is not there, meshes that nobody listens to: a sentence each
+  std::string unanswered_end;              ///< that other bodies moved on where no frame came any more; empty: none did
   FrameCounters frames;
   EffectPlan effects;                          ///< at the end
   std::vector<LeftOutPair> left_out;           ///< at the end
@@ -59,12 +62,15 @@ class BagReplay {
       std::function<void(const rosbag::MessageInstance&, const MonitorPipeline&, const BagReplaySummary& so_far)>;
 
   /// Where nobody names a topic for the map, and the default one is not in the bag, the bag's first one is taken.
-  /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.
-  BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
+  /// `bags`: one, or the pieces of one. Throws rosbag::BagException when one cannot be read, std::runtime_error when no
+  /// body has a topic in them, or where they are not of one run.
+  BagReplay(std::vector<std::string> bags, MonitorConfig config, BagReplayOptions options);
 
   /// The first topic of the bag that carries meshes, is no monitor's own and none of `clouds`, for configurations
   /// that name none. Empty: none.
-  static std::string firstMeshTopic(const std::string& bag, const std::vector<std::string>& clouds);
+  static std::string firstMeshTopic(const std::vector<std::string>& bags, const std::vector<std::string>& clouds);
+  /// What tf_static_file says.
+  const tf2_msgs::TFMessage& lentTransforms() const { return lent_; }
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that
@@ -75,12 +81,15 @@ class BagReplay {
 
  private:
   struct Run;
-  std::string path_;
+  std::vector<std::string> paths_;
   MonitorConfig config_;
   BagReplayOptions options_;
+  tf2_msgs::TFMessage lent_;
+  std::vector<std::string> pauses_;            // between bags, a sentence each
   std::vector<std::string> map_topics_;        // of the bag
   std::map<std::string, std::string> topics_;  // of the bag, with their types
 
+  void requireOneRun(const OpenBags& bags);
   void chooseMapTopic();
   std::string mapSource() const;
   std::string unheardMaps() const;

@@ -173,7 +173,8 @@ void MonitorPipeline::nameClocks(Outcome& outcome) const {
     if (!sources_[b].frame.empty()) frames.insert(sources_[b].frame);
     if (const auto ahead_s = sources_[b].lead.seconds()) look("body '" + config_.bodies[b].body.name + "'", *ahead_s);
   }
-  if (const auto ahead_s = map_lead_.seconds(); ahead_s && outcome.step->map.surface) look("the octomap", *ahead_s);
+  const bool has_map = outcome.step->map.surface != nullptr;
+  if (const auto ahead_s = map_lead_.seconds(); has_map && ahead_s) look("maps on " + config_.mapName(), *ahead_s);
   std::set<std::string> told;
   for (const std::string& frame : frames) {
     const std::optional<TransformFeed::Ahead> ahead = transforms_.mostAhead(fixed_frame_, frame);

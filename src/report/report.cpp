@@ -142,14 +142,19 @@ void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodie
 
 void Report::writeStep(const Outcome& o, std::int64_t told_ns, const std::string& clock_body) {
   const StepStats& s = o.stats;
-  steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
-         << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << assuranceOf(o).clear()
-         << ',' << o.complete << ',' << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ','
-         << o.counts.leaving << ',' << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces
-         << ',';
+  const Assurance assurance = assuranceOf(o);
+  // The status of a step that lacks nothing but its proof says nothing of why.
+  std::string reason = o.reason;
+  for (const std::string& missing : assurance.missing) {
+    if (o.answered && o.reason.empty()) reason += (reason.empty() ? "" : "; ") + missing;
+  }
+  steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ',' << csvField(reason)
+         << ',' << o.answered << ',' << toString(o.start_state) << ',' << assurance.clear() << ',' << o.complete << ','
+         << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ',' << o.counts.leaving << ','
+         << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces << ',';
   if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
   steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
-         << s[Stage::OBSTACLE].in << ',' << assuranceOf(o).proved << ',' << told_ns << ',';
+         << s[Stage::OBSTACLE].in << ',' << assurance.proved << ',' << told_ns << ',';
   // Of several maps of one stamp the time at which it came tells which it was.
   const bool has_map = o.answered && o.step && o.step->map.surface;
   if (has_map) steps_ << o.step->map.stamp_ns;

@@ -45,6 +45,9 @@ class Report {
   /// What the run did not look at, a sentence each: it stands beside what was found.
   void setNotLookedAt(std::vector<std::string> sentences) { not_looked_at_ = std::move(sentences); }
 
+  /// Why not all of the recording was looked at, which ends the proof of the whole; empty: all was.
+  void setUnansweredEnd(std::string sentence) { unanswered_end_ = std::move(sentence); }
+
   /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
   /// naming the file.
   void finish();
@@ -52,7 +55,8 @@ class Report {
   /// with `reasons` also why not; and what was not looked at.
   std::string headline(bool reasons = true) const;
   /// What stands in the way of a proof: "3 of 40 frames: NO_MAP: no octomap has been received yet (3)". Empty: every
-  /// frame but a first one, of which there is nothing to say, has an answer that is proved, and there is one.
+  /// frame but a first one, of which there is nothing to say, has an answer that is proved, there is one, and the
+  /// recording does not go on after the last.
   std::string unproved() const;
 
  private:
@@ -104,6 +108,7 @@ class Report {
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
   std::vector<std::string> not_looked_at_;
+  std::string unanswered_end_;
   FrameCounters counters_;
 };
 

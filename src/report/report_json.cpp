@@ -53,8 +53,9 @@ std::string Report::unproved() const {
   for (const auto& [kind, found] : unproved_) {
     reasons += (reasons.empty() ? "" : ", ") + found.first + " (" + std::to_string(found.second) + ")";
   }
-  if (!reasons.empty()) return ofFrames(unprovedFrames(), frames_) + ": " + reasons;
-  return answered_ > 0 ? "" : frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
+  if (!reasons.empty()) reasons = ofFrames(unprovedFrames(), frames_) + ": " + reasons;
+  if (reasons.empty() && answered_ == 0) reasons = frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
+  return reasons + (reasons.empty() || unanswered_end_.empty() ? "" : "; ") + unanswered_end_;
 }
 
 std::string Report::headline(bool reasons) const {

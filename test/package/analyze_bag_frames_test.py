@@ -1,5 +1,6 @@
 """Frames of a bag find their place: late, long and repeated transforms, static bodies, parts of one message."""
 import copy
+import json
 import unittest
 
 import genpy
@@ -112,6 +113,44 @@ class AnalyzeBagFramesTest(AnalyzeBagTestCase):
                           '  upper: {topic: /parts, marker: {namespace: upper}}\n')
         report = self.analyze('shared', self.write('shared.bag', messages), '--params', params)
         self.assertEqual(self.statuses_of(report), {'FIRST_FRAME': 1, 'OK': 4})
+
+    def ended(self, name, others, bodies):
+        """Exit status and last line of a cloth that rests for a second, and of what else moves in the world."""
+        start, cloths = self.messages[0][2], []
+        for k in range(11):
+            message, at = copy.deepcopy(self.cloths[0][1]), start + genpy.Duration.from_sec(0.1 * k)
+            message.header.stamp = at
+            cloths.append(('/cloth', message, at))
+        bag = self.write(name + '.bag', sorted(cloths + others, key=lambda one: one[2]))
+        status, _, said, _ = self.analyzed(name, bag, *self.params('bodies: {cloth: {topic: /cloth, self_collision: false}, %s}\n' % bodies))
+        return status, said
+
+    def test_the_clock_body_ends_before_others(self):
+        """What moves on by itself is looked at by nobody: that is no recording of which all is proved."""
+        start, expected = self.messages[0][2], "not proved: the frames of body 'cloth', each of which ends a step, end %s s before those of body '%s'"
+        hand = self.folder / 'tool.obj'
+        hand.write_text('v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n')
+
+        def until(end_s):
+            times = [start + genpy.Duration.from_sec(0.1 * k) for k in range(int(10 * end_s) + 1)]
+            others = []
+            for at in times:
+                message = copy.deepcopy(self.cloths[0][1])
+                message.header.stamp = at
+                for v in message.vertices:
+                    v.z += 9
+                others.append(('/other', message, at))
+            return others, [('/tf', TFMessage([transform('tool', at, z=9)]), at) for at in times]
+        other, rigid = 'other: {topic: /other%s}', 'tool: {rigid: {mesh: %s, frame: tool}}' % hand
+        for end_s, status in ((1.4, 0), (3, 3)):
+            frames, transforms = until(end_s)
+            for name, messages, bodies in (('other', frames, other % ''), ('tool', transforms, rigid)):
+                with self.subTest(name, end_s=end_s):
+                    got, said = self.ended(name, messages, bodies)
+                    self.assertEqual(got, status, said)
+                    self.assertEqual(expected % ('2.000', name) in said.splitlines()[-1] if said else False, status == 3, said)
+            self.assertEqual(self.ended('still', frames, other % ', motion: static')[0], 0, 'its newest frame holds at all times')
+        self.assertIn(expected % ('2.000', 'other'), json.loads((self.folder / 'other/report.json').read_text())['headline'])
 
 
 if __name__ == '__main__':

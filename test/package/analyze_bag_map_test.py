@@ -51,6 +51,15 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         twins = [('/octomap_binary', empty, start), ('/octomap_binary', self.octomap(), start)]
         self.expect_same(self.analyze('twins', self.write('twins.bag', twins + self.cloths)))
 
+    def test_maps_that_are_stamped_ahead_of_the_frames(self):
+        """By a clock that is ahead: where things were at the map's stamp is then not where they were when it was made."""
+        for ahead_s, expected in ((0.1, 0), (5, 3)):
+            octomap = copy.deepcopy(self.octomap())
+            octomap.header.stamp = self.cloths[0][2] + genpy.Duration.from_sec(ahead_s)
+            status, _, said, _ = self.analyzed('ahead', self.bag_with('ahead.bag', ('/octomap_binary', octomap)))
+            self.assertEqual(status, expected, said)
+        self.assertRegex(said.splitlines()[-1], 'not proved: .*stamps of maps on /octomap_binary are up to 5 s later than they come')
+
     def test_a_map_that_is_made_of_clouds(self):
         """A plate that a sensor at the world's origin sees below the cloth, which sinks onto it."""
         height = sum(min(v.z for v in cloth.vertices) for _, cloth, _ in (self.cloths[0], self.cloths[-1])) / 2

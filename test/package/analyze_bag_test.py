@@ -56,6 +56,15 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
         headline = json.loads((self.folder / 'large/report.json').read_text())['headline']
         self.assertRegex(headline, r'TELEPORT: .* m across: are its coordinates in millimetres\?')
 
+    def test_a_step_that_is_not_proved_says_why_in_its_row(self):
+        mask = 'vertex_mask: [%s]' % ', '.join(map(str, range(len(self.cloths[0][1].vertices))))
+        status, _, said, steps = self.analyzed('masked', self.bag, *self.params('bodies: {cloth: {topic: /cloth, %s}}\n' % mask))
+        self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'OK'}), said)
+        rows = list(csv.DictReader((self.folder / 'masked/steps.csv').read_text().splitlines()))
+        self.assertEqual(rows[3]['reason'], "vertex_mask names every vertex of body 'cloth', so nothing of it was checked")
+        plain = list(csv.DictReader((self.plain / 'steps.csv').read_text().splitlines()))
+        self.assertEqual({row['reason'] for row in plain}, {''})
+
     def test_a_promise_that_nobody_looked_at_is_not_kept(self):
         octomap = ('/octomap_binary', self.octomap(), self.messages[0][2])
         for frames, said in ((2, '1 promise of .* s in the middle, 0 kept, 0 void, 1 not looked at'),

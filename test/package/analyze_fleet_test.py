@@ -66,6 +66,24 @@ class FleetTest(FolderTestCase):
         self.assertNotIn('http', page.replace('<!doctype html>', ''), 'it loads nothing')
         self.assertFalse(list(self.out.glob('**/*.part')))
 
+    def test_pieces_of_one_recording_are_one(self):
+        messages, out = messages_of(self.first), self.folder / 'pieces_out'
+        half = len(messages) // 2
+        pieces = [write_bag(self.folder / ('cut_2026-01-31-12-00-0%d_%d.bag' % (k, k)), part)
+                  for k, part in enumerate((messages[:half], messages[half:]))]
+        ran = fleet(pieces[1], self.second, pieces[0], '--params', self.params, '--out', out)
+        self.assertIn(ran.returncode, (0, 3), ran.stderr)
+        self.assertEqual(rows_of(out, 'SELECT name, bag FROM recordings ORDER BY name'),
+                         [('cut_2026-01-31-12-00-00', '\n'.join(map(str, pieces))), ('second', str(self.second))])
+        for table in TABLES:
+            self.assertEqual((out / 'recordings/cut_2026-01-31-12-00-00/report' / table).read_bytes(),
+                             (self.out / 'recordings/first/report' / table).read_bytes(), table)
+        self.assertEqual(rows_of(out, "SELECT bag_bytes FROM recordings WHERE name LIKE 'cut%'"),
+                         [(sum(piece.stat().st_size for piece in pieces),)])
+        alone = fleet(pieces[1], '--params', self.params, '--out', self.folder / 'alone_out')
+        self.assertEqual(rows_of(self.folder / 'alone_out', 'SELECT name FROM recordings'), [(pieces[1].stem,)])
+        self.assertEqual(alone.returncode, 3, 'the map is in the first')
+
     def test_again_and_with_changes(self):
         def stamps():
             return {p: p.stat().st_mtime_ns for p in self.out.glob('recordings/*/**/re*.json')}

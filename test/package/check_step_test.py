@@ -4,6 +4,8 @@ import math
 import re
 import unittest
 
+import numpy as np
+
 from checkout import CHECKOUT, TOOLS, FolderTestCase, run
 
 NOT_PROVED = 3
@@ -71,6 +73,41 @@ class CheckStepTest(FolderTestCase):
         self.assertIn('10.ply stands before %s: the numbers in the names go neither up nor down' % two, done.stderr)
         for order in ((one, two, ten), (ten, two, one), (one, two, one)):
             self.assertEqual(run(TOOL, *order).returncode, 0, order)
+
+    def test_an_array_is_what_its_frames_are_as_files(self):
+        frames = [sheet(0) + sheet(z) for z in (0.3, 0.1, -0.1)]
+        files = [self.folder / ('frame_%d.ply' % k) for k in range(3)]
+        for file, points in zip(files, frames):
+            write(file, points, self.FACES)
+        array, tables = self.folder / 'frames.npy', [self.folder / (name + '.csv') for name in ('files', 'array')]
+        np.save(array, np.array(frames))
+        self.assertEqual(run(TOOL, *files, '--contacts', tables[0]).returncode, 0)
+        done = run(TOOL, array, '--topology', files[0], '--contacts', tables[1])
+        self.assertEqual((done.returncode, done.stderr), (0, ''))
+        self.assertGreater(len(tables[0].read_text().splitlines()), 100, 'too little to mean anything')
+        self.assertEqual(tables[0].read_text(), tables[1].read_text())
+        lost = np.array(frames)
+        lost[1, 700] = np.nan
+        np.save(array, lost)
+        self.assertEqual(run(TOOL, array, '--topology', files[0]).returncode, NOT_PROVED)
+        one, few = self.folder / 'one.npy', self.folder / 'few.npy'
+        np.save(one, np.array(frames[0]))
+        np.save(few, np.zeros((2, 5, 3)))
+        for words, said in (([array], 'an array has no faces; name a mesh file of these vertices by --topology'),
+                            ([one, '--topology', files[0]], 'one.npy: is one frame; a step needs two'),
+                            ([few, '--topology', files[0]], 'few.npy: has 5 vertices, and .*frame_0.ply has 1152'),
+                            ([*files, '--topology', files[0]], 'frame_0.ply: is no .npy')):
+            done = run(TOOL, *words)
+            self.assertEqual(done.returncode, 1)
+            self.assertRegex(done.stderr, said)
+        self.assertEqual(run(TOOL, one, one, '--topology', files[0]).returncode, 0, 'frames one by one')
+
+    def test_a_rope_has_no_faces_to_tell_of(self):
+        ropes = [self.folder / (name + '.obj') for name in 'ab']
+        for rope, n in zip(ropes, (3, 4)):
+            rope.write_text(''.join('v %d 0 0\n' % k for k in range(n)) + 'l ' + ' '.join(map(str, range(1, n + 1))) + '\n')
+        self.assertIn('(4 vertices and 3 edges of lines, expected 3 vertices and 2 edges of lines, the same ones)',
+                      run(TOOL, *ropes).stderr)
 
     def refused(self, words, *arguments):
         self.assertEqual(self.check(*arguments), NOT_PROVED, self.said)

@@ -99,7 +99,7 @@ class ExamplesTest(PythonTestCase):
 
     def test_every_example_is_run_here(self):
         self.assertEqual({p.name for p in EXAMPLES.iterdir() if p.suffix == '.py'},
-                         {'two_frames.py', 'contacts_over_time.py', 'valid_step.py', 'read_tables.py'})
+                         {'two_frames.py', 'contacts_over_time.py', 'valid_step.py', 'read_tables.py', 'bag_from_arrays.py'})
 
     def test_two_frames_say_what_the_cpp_example_says(self):
         lines = self.run_example('two_frames.py')
@@ -145,6 +145,100 @@ class ExamplesTest(PythonTestCase):
         self.assertEqual(lines[0], '0.100 s: proved, nothing touches')
         self.assertEqual(lines[2], '0.300 s: proved, something touches anew')
         self.assertEqual((self.folder / 'contacts.png').read_bytes()[1:4], b'PNG')
+
+    def recorded(self, *arguments, contacts=True, params='{}', answered=4):
+        """The bag of the example is read and proved by analyze_bag."""
+        bag, report, given = self.folder / 'arrays.bag', self.folder / 'report', self.folder / 'given.yaml'
+        lines = self.run_example('bag_from_arrays.py', arguments[0], bag, *arguments[1:])
+        given.write_text(params)
+        ran = run(TOOLS / 'analyze_bag', bag, '--report', report, '--quiet', '--params', given)
+        self.assertEqual((ran.returncode, ran.stderr), (0, ''), ran.stdout)
+        self.assertIn('in %d answered steps' % answered if not contacts else 'of %d answered steps' % answered, ran.stdout)
+        self.assertEqual(ran.stdout.startswith('First contact '), contacts, ran.stdout)
+        return lines[-1]
+
+    def falling(self, dtype=float):
+        """Five frames of the two triangles, of which the upper one is at the lower one's height in the middle of the third step."""
+        frames = np.repeat(two_triangles(dtype)[0][np.newaxis], 5, axis=0)
+        frames[:, 3:, 2] = .25 - .1 * np.arange(5)[:, np.newaxis]
+        return frames
+
+    def test_bag_from_arrays(self):
+        frames, mesh = self.falling(np.float32), self.folder / 'mesh.ply'
+        meshio.write(mesh, meshio.Mesh(frames[0], [('triangle', FACES.astype('i4'))]))
+        np.save(self.folder / 'a.npy', frames)
+        self.assertRegex(self.recorded(self.folder / 'a.npy', '--topology', mesh), '5 frames of 6 vertices, 2 faces and 0 lines')
+        np.savez(self.folder / 'a.npz', positions=1000 * self.falling(), faces=FACES, times=np.arange(5) / 10)
+        self.recorded(self.folder / 'a.npz', '--scale', 0.001, '--topic', '/cloth', '--frame', 'camera')
+        rows = (self.folder / 'report/steps.csv').read_text().splitlines()
+        self.assertIn('1300000000', rows[4].split(',')[2], 'the times of the archive, after a second')
+        frames_folder = self.folder / 'meshes'
+        frames_folder.mkdir()
+        for i, positions in enumerate(self.falling()):
+            meshio.write(frames_folder / ('%d.obj' % (8 + i)), meshio.Mesh(positions, [('triangle', FACES.astype('i4'))]))
+        self.recorded(frames_folder)
+
+    def test_bag_from_arrays_of_ropes(self):
+        """Two pieces of rope that cross; as lines of a file, and as points in their order."""
+        frames = np.zeros((5, 4, 3))
+        frames[:, :2] = [[-1, 0, 0], [1, 0, 0]]
+        frames[:, 2:] = [[0, -1, .25], [0, 1, .25]]
+        frames[:, 2:, 2] -= .1 * np.arange(5)[:, np.newaxis]
+        rope = self.folder / 'rope.obj'
+        rope.write_text('v 0 0 0\n' * 4 + 'l 1 2\nl 3 4\n')
+        meshio.write(self.folder / 'rope.vtk', meshio.Mesh(frames[0], [('line', np.array([[0, 1], [2, 3]]))]))
+        np.save(self.folder / 'rope.npy', frames)
+        self.assertRegex(self.recorded(self.folder / 'rope.npy', '--topology', self.folder / 'rope.vtk'), '0 faces and 2 lines')
+        self.recorded(self.folder / 'rope.npy', params='topology: {source: file, file: %s}' % rope)
+        # A branched cable, as on doc/messages.md: where three segments meet they do not touch.
+        cable = np.repeat([[[0., 0, 0], [1, 0, 0], [2, 0, 0], [1, .5, 0], [1, 1, 0]]], 5, axis=0)
+        np.save(self.folder / 'cable.npy', cable)
+        rope.write_text('v 0 0 0\n' * 5 + 'l 1 2 3\nl 2 4 5\n')
+        self.recorded(self.folder / 'cable.npy', params='topology: {source: file, file: %s}' % rope, contacts=False)
+        cable[3:, 4] = [2, -.5, 0]  # the branch's end goes over to the other side, through the cable
+        np.save(self.folder / 'cable.npy', cable)
+        self.recorded(self.folder / 'cable.npy', params='topology: {source: file, file: %s}\nmax_vertex_step_m: 0.0' % rope)
+
+    def test_bag_from_arrays_refuses_what_makes_no_frames(self):
+        np.save(self.folder / 'flat.npy', np.zeros((5, 6)))
+        np.savez(self.folder / 'none.npz', a=np.zeros(3))
+        np.save(self.folder / 'few.npy', np.zeros((5, 2, 3)))
+        mesh = self.folder / 'larger.ply'
+        meshio.write(mesh, meshio.Mesh(two_triangles()[0], [('triangle', FACES.astype('i4'))]))
+        for words, said in (([self.folder / 'flat.npy'], 'is an array of 5 x 6; frames x vertices x 3 is needed'),
+                            ([self.folder / 'none.npz'], 'has no array of frames x vertices x 3'),
+                            ([self.folder / 'few.npy', '--topology', mesh], 'a face names vertex 5, and there are 2')):
+            ran = run(sys.executable, EXAMPLES / 'bag_from_arrays.py', words[0], self.folder / 'no.bag', *words[1:])
+            self.assertEqual(ran.returncode, 1)
+            self.assertIn(said, ran.stderr)
+
+
+class OtherMessagesTest(PythonTestCase):
+    def test_the_lines_that_publish_points_again(self):
+        """Those of doc/messages.md, on a bag whose only points are in a type that nobody reads."""
+        import genpy
+        import rosbag
+        from geometry_msgs.msg import Point32, PolygonStamped
+        page = (CHECKOUT / 'doc/messages.md').read_text()
+        code = page.split('## Messages of another type')[1].split('```python\n')[1].split('```')[0]
+        self.assertLessEqual(len(code.splitlines()), 10)
+        with rosbag.Bag(str(self.folder / 'in.bag'), 'w') as bag:
+            for i in range(4):
+                message, at = PolygonStamped(), genpy.Time(1 + .1 * i)
+                message.header.stamp, message.header.frame_id = at, 'world'
+                message.polygon.points = [Point32(x, 0, .1 * i) for x in range(4)]
+                bag.write('/tracker/nodes', message, at)
+        given = self.folder / 'rope.yaml'
+        given.write_text('topology: {source: polyline}\n')
+        tool = [TOOLS / 'analyze_bag', '--report', self.folder / 'report', '--quiet', '--params', given]
+        ran = run(*tool, self.folder / 'in.bag')
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn('doc/messages.md, "Messages of another type"', ran.stderr)
+        (self.folder / 'again.py').write_text(code.replace('message.nodes', 'message.polygon.points'))
+        self.assertEqual(run(sys.executable, self.folder / 'again.py', cwd=self.folder).stderr, '')
+        ran = run(*tool, self.folder / 'out.bag')
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn('No contact in 3 answered steps', ran.stdout)
 
 
 if __name__ == '__main__':

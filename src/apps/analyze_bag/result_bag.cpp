@@ -4,6 +4,7 @@
 #include "apps/analyze_bag/result_bag.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <std_msgs/Bool.h>
 #include <std_msgs/Float64.h>
@@ -15,7 +16,8 @@
 
 namespace dccd {
 
-ResultBag::ResultBag(const std::string& path) : bag_(path), diagnostics_(MONITOR_NAMESPACE) {}
+ResultBag::ResultBag(const std::string& path, tf2_msgs::TFMessage lent)
+    : bag_(path), diagnostics_(MONITOR_NAMESPACE), lent_(std::move(lent)) {}
 
 template <class Message>
 void ResultBag::write(const char* name, const ros::Time& at, const Message& message) {
@@ -33,6 +35,17 @@ static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplayS
 
 void ResultBag::copy(const rosbag::MessageInstance& m, const MonitorPipeline& pipeline,
                      const BagReplaySummary& so_far) {
+  if (!lent_.transforms.empty()) {
+    namespace traits = ros::message_traits;
+    using Message = tf2_msgs::TFMessage;
+    const auto header =
+        boost::make_shared<ros::M_string>(ros::M_string{{"type", traits::datatype<Message>()},
+                                                        {"md5sum", traits::md5sum<Message>()},
+                                                        {"message_definition", traits::definition<Message>()},
+                                                        {"callerid", "/lent"},
+                                                        {"latching", "1"}});
+    bag_.write("/tf_static", m.getTime(), std::exchange(lent_, {}), header);
+  }
   // With every message of the bag, so that frames that do not come are missed as they are live.
   const auto now_ns = static_cast<std::int64_t>(m.getTime().toNSec());
   if (diagnostics_.isDue(now_ns)) {

@@ -12,8 +12,9 @@ namespace dccd {
 
 class ResultBag {
  public:
-  /// Throws rosbag::BagException when the file cannot be opened; the others as OutputBag.
-  explicit ResultBag(const std::string& path);
+  /// `lent`: transforms that no message of the input has; they stand at its beginning. Throws rosbag::BagException when
+  /// the file cannot be opened; the others as OutputBag.
+  ResultBag(const std::string& path, tf2_msgs::TFMessage lent);
   /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
   void copy(const rosbag::MessageInstance& m, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at);
@@ -31,6 +32,7 @@ class ResultBag {
 
   OutputBag bag_;
   Diagnostics diagnostics_;
+  tf2_msgs::TFMessage lent_;
   std::string map_source_;  // where the octomap is looked for; empty when none is expected
 };
 

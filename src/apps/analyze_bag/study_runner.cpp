@@ -150,7 +150,7 @@ std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& refere
 
 class StudyRunner {
  public:
-  StudyRunner(const std::string& bag, const BagReplayOptions& options) : bag_(bag), options_(options) {}
+  StudyRunner(const std::vector<std::string>& bags, const BagReplayOptions& options) : bags_(bags), options_(options) {}
 
   /// `left`: how many come after it.
   RunRecord run(const Variant& variant, std::size_t left) {
@@ -161,7 +161,7 @@ class StudyRunner {
     BagReplayOptions options = options_;
     options.variation = variant.variation;
     RunRecorder recorder;
-    BagReplay(bag_, variant.config, options)
+    BagReplay(bags_, variant.config, options)
         .run([&](const Outcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { recorder.add(o); });
     spent_s_ += std::chrono::duration<double>(Clock::now() - start).count();
     ++runs_;
@@ -176,7 +176,7 @@ class StudyRunner {
     return count + ", about " + std::to_string(std::lround(std::ceil(left_s))) + " s";
   }
 
-  std::string bag_;
+  std::vector<std::string> bags_;
   BagReplayOptions options_;
   double spent_s_ = 0;
   std::size_t runs_ = 0;
@@ -184,14 +184,15 @@ class StudyRunner {
 
 }  // namespace
 
-AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options) {
+AccuracyStudy runStudy(const std::vector<std::string>& bags, const MonitorConfig& config,
+                       const BagReplayOptions& options) {
   Variant whole{REFERENCE, "", unlimited(config), {}, false};
   Options& detector = whole.config.monitor.detector;
   detector.accuracy = finest(config);
   detector.patches = true;
   detector.suppress_initial = false;
   whole.setting = nameOf(detector.accuracy);
-  StudyRunner runner(bag, options);
+  StudyRunner runner(bags, options);
   constexpr std::size_t ABOUT = 20;  // how many runs there are is known once the reference is
   runner.run(whole, ABOUT);          // warms up: the first run of all is the slowest, whatever its setting
   AccuracyStudy study(runner.run(whole, ABOUT));

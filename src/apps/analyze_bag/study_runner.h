@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "node/bag_replay.h"
 #include "report/accuracy_study.h"
@@ -10,6 +11,7 @@ namespace dccd {
 
 /// The reference is the bag as it was recorded, with the finest setting that the configuration allows. Throws what
 /// BagReplay throws.
-AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options);
+AccuracyStudy runStudy(const std::vector<std::string>& bags, const MonitorConfig& config,
+                       const BagReplayOptions& options);
 
 }  // namespace dccd

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "input/mesh_formats.h"
+#include "input/npy_file.h"
 #include "support/folder_test.h"
 #include "support/said.h"
 
@@ -626,6 +627,26 @@ TEST_F(PlyGrammar, OtherElements) {
   EXPECT_TRUE(mentions(mesh.hints[1], "'material' (2)")) << mesh.hints[1];
 }
 
+TEST_F(PlyGrammar, ElementsThatMayHoldFaces) {
+  const auto withPoly = [](const std::string& type, const std::string& rows, const std::string& name = "poly") {
+    const auto count = std::to_string(std::count(rows.begin(), rows.end(), '\n'));
+    return head(xyz() + faceElement() + "element " + name + " " + count + "\nproperty list uchar " + type + " idx\n") +
+           points() + faces() + rows;
+  };
+  const MeshFile mesh = read("a.ply", withPoly("int", "0\n3 1 3 2\n3 0 1 3\n"));
+  EXPECT_EQ(mesh.faces, TWO) << "the rest is used";
+  EXPECT_EQ(mesh.unchecked, (std::vector<std::size_t>{2, 3})) << "an empty list holds nothing";
+  ASSERT_EQ(mesh.hints.size(), 2u);
+  EXPECT_TRUE(mentions(mesh.hints[0], "'poly' (3) is skipped, though its lists of integers may be faces"));
+  EXPECT_TRUE(
+      mentions(mesh.hints[1], "2 polygons cannot be used and are unchecked, the first is row 1 of element 'poly'"));
+  const MeshFile both = read("a.ply", head(xyz() + faceElement(3) + "element poly 1\nproperty list uchar uint idx\n") +
+                                          points() + faces() + "3 0 1 0\n3 1 3 2\n");
+  EXPECT_EQ(both.unchecked, (std::vector<std::size_t>{3})) << "what repeats a corner lies in another face";
+  EXPECT_EQ(read("a.ply", withPoly("float", "3 1 3 2\n")).unchecked.size(), 0u);
+  EXPECT_EQ(read("a.ply", withPoly("int", "1 0\n", "range_grid")).unchecked.size(), 0u) << "a scanner's pixels";
+}
+
 TEST_F(PlyGrammar, Edges) {
   const auto edges = [](const std::string& rows, const std::string& type = "int") {
     const auto count = std::to_string(std::count(rows.begin(), rows.end(), '\n'));
@@ -870,6 +891,83 @@ TEST_F(DaeGrammar, WithoutAMesh) {
   const std::string nodes = "<node><translate>1 2 3</translate><node><translate>0 1 0</translate></node></node>";
   expectRefused("a.dae", dae(two(), nodes), "a.dae: ", "there are no triangles");
   expectRefused("a.dae", dae(list("triangles", 0, "<p></p>"), node() + nodes), "a.dae: ", "there are no triangles");
+}
+
+// --- NPY
+
+class NpyGrammar : public Grammar {
+ protected:
+  static std::string npy(const std::string& dictionary, const std::string& numbers, char version = 1) {
+    std::string header = dictionary + "\n", size;
+    for (std::size_t i = 0; i < (version == 1 ? 2u : 4u); ++i) size += static_cast<char>(header.size() >> 8 * i);
+    return "\x93NUMPY" + std::string{version, '\0'} + size + header + numbers;
+  }
+  static std::string head(const std::string& shape, const std::string& type = "<f8",
+                          const std::string& fortran = "False") {
+    return "{'descr': '" + type + "', 'fortran_order': " + fortran + ", 'shape': " + shape + ", }";
+  }
+  template <typename T>
+  static std::string numbers(const std::vector<double>& values, bool big = false) {
+    std::string bytes;
+    for (const double value : values) {
+      const T number = static_cast<T>(value);
+      std::string one(sizeof number, '\0');
+      std::memcpy(one.data(), &number, sizeof number);
+      if (big) std::reverse(one.begin(), one.end());
+      bytes += one;
+    }
+    return bytes;
+  }
+  std::vector<Positions> frames(const std::string& bytes) {
+    const std::string path = (folder_ / "a.npy").string();
+    std::ofstream(path, std::ios::binary) << bytes;
+    return loadNpyFrames(path);
+  }
+  void expectRefusedArray(const std::string& bytes, const std::string& word) {
+    try {
+      frames(bytes);
+      ADD_FAILURE() << word;
+    } catch (const MeshFileError& error) {
+      EXPECT_TRUE(mentions(error.what(), "a.npy: ") && mentions(error.what(), word)) << error.what();
+    }
+  }
+  const std::vector<double> ROW{0, 1, 2, 3, 4, 5.25, 6, 7, 8, 9, 10, 11};
+  const std::vector<Positions> TWO_FRAMES{{{0, 1, 2}, {3, 4, 5.25}}, {{6, 7, 8}, {9, 10, 11}}};
+};
+
+TEST_F(NpyGrammar, Numbers) {
+  EXPECT_EQ(frames(npy(head("(2, 2, 3)"), numbers<double>(ROW))), TWO_FRAMES);
+  EXPECT_EQ(frames(npy(head("(2, 2, 3)", ">f8"), numbers<double>(ROW, true))), TWO_FRAMES);
+  EXPECT_EQ(frames(npy(head("(2, 2, 3)", "<f4"), numbers<float>(ROW))), TWO_FRAMES);
+  EXPECT_EQ(frames(npy(head("(2, 2, 3)", ">f4"), numbers<float>(ROW, true), 3)), TWO_FRAMES);
+  for (const std::string type : {"<i8", "<f2", "|O", "<c16"}) {
+    expectRefusedArray(npy(head("(2, 2, 3)", type), numbers<double>(ROW)), "holds '" + type + "'");
+  }
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(frames(npy(head("(1, 1, 3)"), numbers<double>({nan, 0, 0})))[0][0].x()));
+}
+
+TEST_F(NpyGrammar, Orders) {
+  const std::vector<double> fortran{0, 6, 3, 9, 1, 7, 4, 10, 2, 8, 5.25, 11};
+  EXPECT_EQ(frames(npy(head("(2, 2, 3)", "<f8", "True"), numbers<double>(fortran))), TWO_FRAMES);
+}
+
+TEST_F(NpyGrammar, Shapes) {
+  EXPECT_EQ(frames(npy(head("(4, 3)"), numbers<double>(ROW))).size(), 1u);
+  for (const std::string shape : {"(12,)", "(2, 3, 2)", "(1, 2, 2, 3)", "()", "(0, 4, 3)", "(4, 0, 3)"}) {
+    EXPECT_THROW(frames(npy(head(shape), numbers<double>(ROW))), MeshFileError) << shape;
+  }
+}
+
+TEST_F(NpyGrammar, WhatIsCut) {
+  const std::string whole = npy(head("(2, 2, 3)"), numbers<double>(ROW));
+  expectRefusedArray(whole.substr(0, whole.size() - 1), "it is cut");
+  expectRefusedArray(whole + "x", "or holds more");
+  expectRefusedArray(whole.substr(0, 20), "ends in its header");
+  expectRefusedArray("PK\x03\x04 an npz is not one", "is no .npy file");
+  expectRefusedArray(npy(head("(9000000000000000000, 9000000000000000000, 3)"), ""), "it is cut");
+  expectRefusedArray(npy(head("(2, 2, 3)"), numbers<double>(ROW), 4), "version");
+  expectRefusedArray(npy("{'descr': [('x', '<f8')], 'fortran_order': False, 'shape': (4,), }", ""), "'descr'");
 }
 
 // --- the page

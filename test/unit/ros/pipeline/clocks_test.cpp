@@ -136,7 +136,7 @@ TEST(ClocksOfTwoComputers, OfAMap) {
     const Assurance said = assuranceOf(bodies.run(0, 0));
     EXPECT_EQ(said.proved, ahead_s < 1) << ahead_s << " " << describe(said);
     if (said.proved) continue;
-    EXPECT_NE(describe(said).find("stamps of the octomap are up to 1.25 s later than they come"), std::string::npos)
+    EXPECT_NE(describe(said).find("stamps of maps on /map are up to 1.25 s later than they come"), std::string::npos)
         << describe(said);
     bodies.pipeline.reset(StepStatus::RESET, "a test");
     map.stamp_ns = at(0);
