@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <regex>
-#include <set>
+#include <utility>
 
 #include "node/bag_reading.h"
 
@@ -40,10 +41,15 @@ std::optional<PieceName> pieceNameOf(const std::string& bag) {
   return name;
 }
 
-/// Whether the second bag goes on where the first one ends.
-bool goesOn(const BagSpan& first, const BagSpan& second, bool dated) {
+double secondsOf(const BagSpan& span) { return (span.end - span.begin).toSec(); }
+
+/// Whether the second bag goes on where the first one ends, both with messages; `empty`: so many pieces without any lie
+/// between them. One of these lasts as long as the others do, and at both sides of them it may have been silent, too.
+bool goesOn(const BagSpan& first, const BagSpan& second, bool dated, std::size_t empty = 0) {
   const double pause_s = (second.begin - first.end).toSec();
-  return pause_s >= -OUT_OF_ORDER_S && pause_s <= (dated ? PAUSE_OF_DATED_S : PAUSE_S);
+  const double silent_s =
+      empty == 0 ? 0 : static_cast<double>(empty + 2) * std::max(secondsOf(first), secondsOf(second));
+  return pause_s >= -OUT_OF_ORDER_S && pause_s <= silent_s + (dated ? PAUSE_OF_DATED_S : PAUSE_S);
 }
 
 /// The piece before, of a name without a date, lies in the same folder.
@@ -53,73 +59,97 @@ bool followsItsNeighbour(const std::string& bag, const PieceName& name) {
   stem.resize(stem.rfind('_') + 1);
   const fs::path before = path.parent_path() / (stem + std::to_string(name.number - 1) + ".bag");
   const std::optional<BagSpan> first = spanOf(before.string()), second = spanOf(bag);
-  return first && second && goesOn(*first, *second, false);
+  return first && second && !first->isEmpty() && !second->isEmpty() && goesOn(*first, *second, false);
 }
 
 std::string fileName(const std::string& bag) { return fs::path(bag).filename().string(); }
 
+struct Piece {
+  std::size_t place;  // among what was given
+  PieceName name;
+  BagSpan span;
+};
+
+constexpr double UNRELATED_S = std::numeric_limits<double>::infinity();
+
+/// Pieces that go on from each other.
+struct Recording {
+  std::vector<std::size_t> places;
+  unsigned long last_number = 0, last_with_messages = 0;
+  BagSpan span;  // of that one
+
+  void add(const Piece& piece) {
+    places.push_back(piece.place);
+    last_number = piece.name.number;
+    if (piece.span.isEmpty()) return;
+    last_with_messages = last_number;
+    span = piece.span;
+  }
+  /// UNRELATED_S: the piece does not go on from here. Where no times tell, numbers do, as well as any pause would.
+  double pauseBefore(const Piece& piece) const {
+    if (piece.name.number != last_number + 1) return UNRELATED_S;
+    if (piece.span.isEmpty() || span.isEmpty()) return std::numeric_limits<double>::max();
+    const bool goes_on = goesOn(span, piece.span, piece.name.dated, last_number - last_with_messages);
+    return goes_on ? (piece.span.begin - span.end).toSec() : UNRELATED_S;
+  }
+};
+
 }  // namespace
 
 std::vector<std::vector<std::string>> groupedByRun(const std::vector<std::string>& bags) {
-  struct Piece {
-    std::size_t place;
-    PieceName name;
-    BagSpan span;
-  };
-  std::map<std::string, std::vector<Piece>> runs;
-  std::map<std::size_t, std::vector<std::size_t>> groups;  // by the place of the first piece
+  std::map<std::string, std::vector<Piece>> of_name;
+  std::vector<std::vector<std::size_t>> groups;
   for (std::size_t i = 0; i < bags.size(); ++i) {
     const std::optional<PieceName> name = pieceNameOf(bags[i]);
     const std::optional<BagSpan> span = name ? spanOf(bags[i]) : std::nullopt;
     if (span) {
-      runs[name->run + (name->dated ? "/" : "")].push_back({i, *name, *span});
+      of_name[name->run].push_back({i, *name, *span});
     } else {
-      groups[i] = {i};
+      groups.push_back({i});
     }
   }
-  for (auto& [run, pieces] : runs) {
-    std::stable_sort(pieces.begin(), pieces.end(),
-                     [](const Piece& a, const Piece& b) { return a.span.begin < b.span.begin; });
-    std::vector<bool> taken(pieces.size());
-    for (std::size_t first = 0; first < pieces.size(); ++first) {
-      if (taken[first]) continue;
-      std::vector<std::size_t>& group = groups[pieces[first].place];
-      group = {pieces[first].place};
-      std::size_t last = first;
-      for (std::size_t next = first + 1; next < pieces.size(); ++next) {
-        if (taken[next] || pieces[next].name.number != pieces[last].name.number + 1 ||
-            !goesOn(pieces[last].span, pieces[next].span, pieces[next].name.dated)) {
-          continue;
-        }
-        taken[next] = true;
-        group.push_back(pieces[next].place);
-        last = next;
+  for (auto& [name, pieces] : of_name) {
+    // Of equal numbers, which are of several recordings, the earlier one first.
+    std::stable_sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+      return std::pair(a.name.number, a.span.begin) < std::pair(b.name.number, b.span.begin);
+    });
+    std::vector<Recording> recordings;
+    for (const Piece& piece : pieces) {
+      const auto nearest = std::min_element(
+          recordings.begin(), recordings.end(),
+          [&](const Recording& a, const Recording& b) { return a.pauseBefore(piece) < b.pauseBefore(piece); });
+      if (nearest == recordings.end() || nearest->pauseBefore(piece) == UNRELATED_S) {
+        recordings.emplace_back().add(piece);
+      } else {
+        nearest->add(piece);
       }
     }
+    for (Recording& recording : recordings) groups.push_back(std::move(recording.places));
   }
-  std::map<std::size_t, std::vector<std::string>> in_order;
-  for (const auto& [first, places] : groups) {
-    std::vector<std::string>& group = in_order[*std::min_element(places.begin(), places.end())];
-    for (const std::size_t place : places) group.push_back(bags[place]);
-  }
+  std::sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
+    return *std::min_element(a.begin(), a.end()) < *std::min_element(b.begin(), b.end());
+  });
   std::vector<std::vector<std::string>> result;
-  for (auto& [place, group] : in_order) result.push_back(std::move(group));
+  for (const std::vector<std::size_t>& group : groups) {
+    result.emplace_back();
+    for (const std::size_t place : group) result.back().push_back(bags[place]);
+  }
   return result;
 }
 
 std::vector<std::string> missingPieces(const std::vector<std::string>& bags, bool lacks_something) {
-  struct Piece {
+  struct Named {
     std::string bag;
     PieceName name;
   };
-  std::map<std::string, std::map<unsigned long, Piece>> runs;
+  std::map<std::string, std::map<unsigned long, Named>> runs;
   for (const std::string& bag : bags) {
     if (const std::optional<PieceName> name = pieceNameOf(bag))
-      runs[name->run].try_emplace(name->number, Piece{bag, *name});
+      runs[name->run].try_emplace(name->number, Named{bag, *name});
   }
   std::vector<std::string> sentences;
   for (const auto& [run, pieces] : runs) {
-    const Piece& first = pieces.begin()->second;
+    const Named& first = pieces.begin()->second;
     const std::string name = fileName(first.bag);
     if (first.name.number > 0) {
       const bool is_known = first.name.dated || followsItsNeighbour(first.bag, first.name);
@@ -129,7 +159,7 @@ std::vector<std::string> missingPieces(const std::vector<std::string>& bags, boo
             name + "): give the first one, too, which alone has /tf_static and latched maps");
       }
     }
-    const Piece* before = nullptr;
+    const Named* before = nullptr;
     for (const auto& [number, piece] : pieces) {
       if (before && number != before->name.number + 1) {
         sentences.push_back("between " + fileName(before->bag) + " and " + fileName(piece.bag) +

@@ -33,15 +33,15 @@ class BagCheck {
   std::optional<BagSpan> span() {
     if (textAt(0, std::min<std::uint64_t>(size_, MARK_OF_2.size())) != MARK_OF_2) return std::nullopt;
     const Record first = recordAt(MARK_OF_2.size(), size_);
-    std::optional<BagSpan> span;
+    BagSpan span;
     std::uint64_t left = number<std::uint32_t>(first, "conn_count");
     left += number<std::uint32_t>(first, "chunk_count");
     for (auto at = number<std::uint64_t>(first, "index_pos"); left > 0 && at > 0 && at < size_; --left) {
       const Record record = recordAt(at, size_);
       at = record.end;
       if (record.op() != CHUNK_INFO || number<std::uint32_t>(record, "count") == 0) continue;
-      const ros::Time begin = time(record, "start_time"), end = time(record, "end_time");
-      span = span ? BagSpan{std::min(span->begin, begin), std::max(span->end, end)} : BagSpan{begin, end};
+      span.begin = std::min(span.begin, time(record, "start_time"));
+      span.end = std::max(span.end, time(record, "end_time"));
     }
     return span;
   }

@@ -20,11 +20,12 @@ void openBag(const std::string& path, rosbag::Bag& bag);
 
 /// When the first and the last message of a bag came.
 struct BagSpan {
-  ros::Time begin, end;
+  ros::Time begin = ros::TIME_MAX, end = ros::TIME_MIN;
+  bool isEmpty() const { return end < begin; }  ///< no message came
 };
 /// The recorder's threads may write two messages in another order than that of their times, by this at the most [s].
 constexpr double OUT_OF_ORDER_S = 0.1;
-/// By the bag's index alone. None: it has no messages, or cannot be read.
+/// By the bag's index alone. None: it cannot be read.
 std::optional<BagSpan> spanOf(const std::string& path);
 
 /// The bags of one run, as if they were one: messages come in the order of their times.

@@ -336,7 +336,7 @@ BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagRep
 void BagReplay::requireOneRun(const OpenBags& bags) {
   for (std::size_t i = 1; i < paths_.size(); ++i) {
     const std::optional<BagSpan> before = spanOf(paths_[i - 1]), next = spanOf(paths_[i]);
-    if (!before || !next) continue;
+    if (!before || !next || before->isEmpty() || next->isEmpty()) continue;
     if (const ros::Duration pause = next->begin - before->end; pause > LONG_PAUSE) {
       pauses_.push_back("nothing was recorded for " + std::to_string(std::lround(pause.toSec())) + " s between " +
                         paths_[i - 1] + " and " + paths_[i]);
@@ -460,9 +460,9 @@ void BagReplay::tellMissing(Run& run) const {
   for (const std::string& sentence : {unused, unheardMeshes(run.summary)}) {
     if (!sentence.empty()) run.summary.not_looked_at.push_back(sentence);
   }
-  const bool lacks_map = !unused.empty() && may_use_map;
+  const bool lacks_something = run.lacked_transform || (!unused.empty() && may_use_map);
   const auto missing_pieces =
-      run.repeats_latched ? std::vector<std::string>() : missingPieces(paths_, run.lacked_transform || lacks_map);
+      run.repeats_latched && !lacks_something ? std::vector<std::string>() : missingPieces(paths_, lacks_something);
   for (const auto& sentences : {missing_pieces, pauses_}) {
     run.summary.not_looked_at.insert(run.summary.not_looked_at.end(), sentences.begin(), sentences.end());
   }
