@@ -23,7 +23,7 @@ void checkMonitorBlock(const dccd::scene::SceneSpec& spec, const std::string& sc
   const dccd::MonitorConfig config = readConfig(spec.monitor, "monitor/", dccd::robotOfFiles());
   try {
     tf2::BufferCore transforms;
-    const dccd::TransformFeed feed(transforms);
+    dccd::TransformFeed feed(transforms);
     const dccd::MonitorPipeline pipeline(config, feed);  // effects that are not to be had, files
   } catch (const std::exception& error) {
     throw std::runtime_error(scene_path + ": monitor: " + error.what());
