@@ -59,22 +59,21 @@ def find_runners(arguments):
 
 
 def run_all(work, busy, live):
-    """Calls work(runner) for each of both lists, a thread a core. Live tests have deadlines of their own, so only one runs at a
-    time, beside those that compute; when they are done, their thread takes its share of the rest."""
+    """Calls work(runner) for each of both lists. Live tests have deadlines of their own, so only one runs at a time, beside a
+    thread a core that computes: most of their time they wait."""
     busy, live = collections.deque(busy), collections.deque(live)
 
-    def take(queues):
-        for queue in queues:
-            while True:
-                try:
-                    runner = queue.popleft()
-                except IndexError:
-                    break
-                work(runner)
+    def take(queue):
+        while True:
+            try:
+                runner = queue.popleft()
+            except IndexError:
+                return
+            work(runner)
 
-    threads = os.cpu_count() or 1
-    with concurrent.futures.ThreadPoolExecutor(threads) as pool:
-        for future in [pool.submit(take, [live, busy] if i == 0 else [busy]) for i in range(threads)]:
+    queues = [live] + [busy] * (os.cpu_count() or 1)
+    with concurrent.futures.ThreadPoolExecutor(len(queues)) as pool:
+        for future in [pool.submit(take, queue) for queue in queues]:
             future.result()
 
 

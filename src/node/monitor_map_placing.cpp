@@ -67,14 +67,11 @@ bool MonitorPipeline::settleMap(const LoadedMap& loaded, bool may_place, Obstacl
 }
 
 /// Why what it shows may not be there, in words; empty: nothing says so.
-std::string MonitorPipeline::doubtOf(const ObstacleMap& map, const std::string& frame) {
-  const double behind_s = secondsBetween(map.stamp_ns, map_stamp_ns_);
-  const bool is_late = behind_s > 0 && behind_s <= tolerance::LATE_FRAME_S;
-  if (!is_late) map_stamp_ns_ = map.stamp_ns;
-  if (is_late) {
+std::string MonitorPipeline::doubtOf(const LoadedMap& loaded, const std::string& frame) const {
+  if (loaded.is_late) {
     return "the octomap in use is stamped before one that came before it";
   }
-  const std::string doubt = tracks_.doubtAt(frame, fixed_frame_, map.stamp_ns);
+  const std::string doubt = tracks_.doubtAt(frame, fixed_frame_, loaded.stamp_ns);
   return doubt.empty() ? "" : "where the octomap's frame was at its stamp is not known (" + doubt + ")";
 }
 
@@ -100,7 +97,7 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     }
     const std::string frame = map.frame_id;
     const bool is_placed = map.surface != nullptr;
-    if (const std::string doubt = is_placed ? doubtOf(map, frame) : ""; !doubt.empty()) {
+    if (const std::string doubt = is_placed ? doubtOf(loaded, frame) : ""; !doubt.empty()) {
       doubted_map_ns_ = loaded.arrival_ns;
       map_doubt_ = doubt;
     }

@@ -31,6 +31,7 @@ struct LoadedMap : ObstacleMap {
   std::string hint;        ///< what looks like a mistake in what it was made of; empty: nothing does
   std::string slow;        ///< that its making takes too long, and what to do; empty: it does not
   StampNs receipt_ns = 0;  ///< when what it was made of came, by the clock of stamps; 0: nobody knows
+  bool is_late = false;    ///< a map with a later stamp came before it
 };
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
@@ -306,7 +307,7 @@ class MonitorPipeline {
   void nameWaitingMap(std::int64_t now_ns, Outcome& outcome) const;
   void nameSenders(Outcome& outcome) const;
   void nameRenumbered(Outcome& outcome) const;
-  std::string doubtOf(const ObstacleMap& map, const std::string& frame);
+  std::string doubtOf(const LoadedMap& loaded, const std::string& frame) const;
   /// Tf has the frames at the stamp to which maps and static bodies are held.
   bool knowsHeld(StampNs stamp_ns) const;
   /// A map came before a frame of that arrival and has no place yet, but may find one soon.

@@ -176,10 +176,11 @@ std::string MeshStore::unknownAfterNewest(std::uint64_t accounted) const {
 }
 
 std::string MeshStore::unknownWithin(StampNs from_ns, StampNs to_ns) const {
-  if (from_ns < seen_until_ns_) {
+  std::size_t i = firstAtOrAfter(from_ns + 1);
+  const StampNs begin_ns = i > 0 ? frames_[i - 1].frame->stamp_ns : from_ns;
+  if (begin_ns < seen_until_ns_) {
     return "its stamps went back, and what came before with later ones is not used";
   }
-  std::size_t i = firstAtOrAfter(from_ns + 1);
   for (; i < frames_.size() && (i == 0 || frames_[i - 1].frame->stamp_ns < to_ns); ++i) {
     if (!frames_[i].unknown.empty()) return frames_[i].unknown;
   }
