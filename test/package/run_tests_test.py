@@ -106,7 +106,7 @@ class RunTestsTest(unittest.TestCase):
         self.assertGreater(result.failed, 0)
         self.assertEqual(result.passed, 0)
 
-    def test_live_tests_run_one_at_a_time_and_then_their_thread_helps(self):
+    def test_live_tests_run_one_at_a_time_beside_a_thread_a_core(self):
         meeting, ran, now, most = threading.Barrier(2), [], [], []
 
         def work(runner):
