@@ -129,6 +129,8 @@ class Transforms:
             for other in moving[k:bisect.bisect_right(stamps, stamps[k])]:
                 if other.came < self.said and max(other.off(moving[k])) > 1e-6:
                     raise Unknown('frame %s was at two places at the stamp %.9f s' % (child, stamps[k] / NS))
+        if stamps[j] - stamps[i] > 2 * NS:
+            raise Unknown('no transform of %s came for more than 2 s around %.9f s' % (child, stamp / NS))
         if moving[i].parent != moving[j].parent:
             raise Unknown('frame %s changes its parent at %.9f s' % (child, stamp / NS))
         return moving[i], moving[j]
@@ -210,17 +212,20 @@ class Stream:
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
         self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
         self.every, self.max_step_ns = frames, max_step_ns  # in the order in which they came
-        self.taken, self.until, self.held = 0, -1, []
+        self.taken, self.until, self.held, self.voided = 0, -1, [], []
 
     def known(self):
         """What had come when it was said, by stamp. One that goes back voids all that has a later stamp."""
         if self.transforms.said < self.until:
-            self.taken, self.held = 0, []
+            self.taken, self.held, self.voided = 0, [], []
         self.until = self.transforms.said
         while self.taken < len(self.every) and self.every[self.taken].came <= self.until:
             frame = self.every[self.taken]
+            if self.held and self.held[-1].stamp > frame.stamp + NS:
+                self.voided = []  # time begins anew
             while self.held and self.held[-1].stamp > frame.stamp:
-                self.held.pop()
+                late = self.held.pop()
+                self.voided += [late.stamp] if late.stamp <= frame.stamp + NS else []
             self.held.append(frame)
             self.taken += 1
         return self.held
@@ -245,6 +250,8 @@ class Stream:
                 raise Unknown('%s became another mesh within the step' % self.name)
             if b.stamp - a.stamp > self.max_step_ns:
                 raise Unknown('%s has a gap of %.3f s within the step' % (self.name, (b.stamp - a.stamp) / NS))
+        if any(frames[0].stamp < stamp < frames[-1].stamp for stamp in self.voided):
+            raise Unknown('a frame of %s within the step came before its stamps went back' % self.name)
         for stamp, why, at in self.refused:
             if frames[0].stamp < stamp < frames[-1].stamp and at < said:
                 raise Unknown('a frame of %s came for %.9f s and cannot be used: %s' % (self.name, stamp / NS, why))
@@ -327,6 +334,8 @@ class Held(Stream):
             raise Unknown('%s has not come' % self.name)
         if any(at > came[-1].came and at < said for _, _, at in self.refused):
             raise Unknown('the newest frame of %s was refused' % self.name)
+        if any(0 < f.stamp - came[-1].stamp <= NS for f in came):
+            raise Unknown('the newest frame of %s is stamped before one that came before it' % self.name)
         if any(b.came - a.came <= self.max_step_ns and b.came >= said - self.timeout for a, b in zip(came, came[1:])):
             raise NotCovered('%s comes more often than each max_step_s, and came anew within answer_timeout_s' % self.name)
         return came[-1:]

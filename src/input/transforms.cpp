@@ -87,6 +87,7 @@ TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped&
 /// What was sent of one that moves. tf2 forgets all frames or none.
 void TransformFeed::forget(Frame& frame) {
   kept_count_ -= frame.sent.size();
+  ++frame.times_forgotten;
   frame.sent.clear();
   frame.lead = {};
   frame.is_cut = frame.is_apart = has_apart_ = true;
@@ -105,13 +106,26 @@ void TransformFeed::forgetAllOf(const std::string& sender) {
   }
 }
 
+/// What was forgotten since time began anew the last time is of this one, as far as it has come: tf may be early.
 void TransformFeed::beginAnew(StampNs stamp_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool any_ahead = std::any_of(frames_.begin(), frames_.end(), [&](const auto& named) {
-    const Frame& frame = named.second;
-    return !frame.sent.empty() && frame.sent.rbegin()->first > stamp_ns + JUMP_BACK_NS;
-  });
-  if (any_ahead) clear();
+  const auto isOfBefore = [&](const Frame& frame) {
+    return !frame.sent.empty() && frame.times_forgotten == frame.forgotten_before &&
+           frame.sent.rbegin()->first > stamp_ns + JUMP_BACK_NS;
+  };
+  ++change_;
+  if (std::all_of(frames_.begin(), frames_.end(),
+                  [&](const auto& named) { return named.second.sent.empty() || isOfBefore(named.second); })) {
+    clear();
+  }
+  for (auto& named : frames_) {
+    Frame& frame = named.second;
+    if (isOfBefore(frame)) {
+      frame.newest.clear();
+      forget(frame);
+    }
+    frame.forgotten_before = frame.times_forgotten;
+  }
 }
 
 /// Else it is kept, and those are forgotten that the buffer forgets with it.
@@ -138,6 +152,7 @@ bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform,
 void TransformFeed::clear() {
   buffer_.clear();
   for (auto& named : frames_) {
+    ++named.second.times_forgotten;
     named.second.sent.clear();
     named.second.newest.clear();
     named.second.lead = {};

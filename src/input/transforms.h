@@ -82,8 +82,8 @@ class TransformFeed {
   };
   std::optional<Ahead> mostAhead(const std::string& target, const std::string& source) const;
 
-  /// Time begins anew at this stamp. If a frame has been sent for a time well after it, what was sent before is
-  /// forgotten of all that move: each comes again.
+  /// Time begins anew at this stamp. What was sent of frames for times well after it is forgotten, unless it was sent
+  /// since their stamps went back, too.
   void beginAnew(StampNs stamp_ns);
   /// How often where frames were before was forgotten.
   std::uint64_t timesForgotten() const { return times_forgotten_; }
@@ -121,6 +121,8 @@ class TransformFeed {
     bool passed_over = false;               ///< something came for a time after the newest, and is not used
     std::uint64_t lost = 0;                 ///< lost_ when the newest came
     bool is_disputed = false;               ///< it is on both topics, and not at one place
+    std::uint64_t times_forgotten = 0;      ///< what was sent of it,
+    std::uint64_t forgotten_before = 0;     ///< and how often when time began anew
     StampLead lead;                         ///< of one that moves
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;

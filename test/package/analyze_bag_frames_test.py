@@ -59,11 +59,11 @@ class AnalyzeBagFramesTest(AnalyzeBagTestCase):
         return statuses, {int(row.split(',')[0]) for row in (self.folder / name / 'contacts.csv').read_text().splitlines()[1:]}
 
     def test_a_simulation_that_is_reset_soon(self):
-        """Two rounds of half a second with the same stamps, and the hand elsewhere in the second one, where it goes through the cloth. Of the
-        first step after the reset nobody knows whether what was sent for it before is void."""
+        """Two rounds of half a second with the same stamps, and the hand elsewhere in the second one, where it goes through the cloth. Up
+        to the last stamp of the first round frames may only have come late, so that no step is proved."""
         rounds = [(0.1 * (k % 6), 5 if k < 6 else 0.35 - 0.1 * (k - 6)) for k in range(12)]
         statuses, steps = self.with_hand('reset', rounds)
-        self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': 9, 'PARTIAL': 1, 'TIME_JUMP': 1})
+        self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': 5, 'PARTIAL': 5, 'TIME_JUMP': 1})
         self.assertTrue(steps)
         self.assertGreater(min(steps), 7)
 

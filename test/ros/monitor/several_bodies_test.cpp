@@ -77,10 +77,10 @@ TEST_F(Tabled, AStaticBodysOnlyFrameCountsWhileTheMonitorIsDisabled) {
 }
 
 TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
-  table.publish(meshStamped(floorAt(0), 1));
+  table.publish(meshStamped(floorAt(0), 4));
   ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
-  table.publish(meshStamped(floorAt(0), 2, "nowhere"));  // waits for its transform, and the next one behind it
-  table.publish(meshStamped(floorAt(-20), 3));
+  table.publish(meshStamped(floorAt(0), 5, "nowhere"));  // waits for its transform, and the next one behind it
+  table.publish(meshStamped(floorAt(-20), 6));
   ros::Duration(0.2).sleep();
   ASSERT_TRUE(trigger("reset").success);
   EXPECT_TRUE(waitUntil([&] { return isPastTheTable(); }));
