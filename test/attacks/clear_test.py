@@ -50,7 +50,13 @@ class ClearTest(AttackTest):
             rospy.set_param('/%s/bodies/%s' % (name, key), value)
         self.start_node(name, publishes=False, clock_body='cloth', **parameters)
         self.to = {topic: self.advertise('/%s/%s' % (name, topic), PointCloud2, 100) for topic in topics}
-        self.tf = self.advertise('/tf', TFMessage, 100)
+        self.tf = self.advertise_transforms(name, '/tf')
+
+    def advertise_transforms(self, name, topic):
+        """To this node: one of before may still listen, and what is sent until this one does is lost to it."""
+        publisher = self.advertise(topic, TFMessage, 100)
+        wait_for(lambda: any(c.endpoint_id == '/' + name for c in publisher.impl.connections), 20, '%s to listen to %s' % (name, topic))
+        return publisher
 
     def step_of(self, stamp, z=0.0):
         """The cloth's frame; its outcome and the first state that is of it."""
@@ -216,7 +222,7 @@ class ClearTest(AttackTest):
         for k, by in enumerate((0.5, 0.0009)):
             name = 'static_%d' % k
             self.start_bodies(name, {'cloth/topic': '/%s/cloth' % name, 'table/topic': '/%s/table' % name, 'table/motion': 'static'}, ['cloth', 'table'])
-            fixed = self.advertise('/tf_static', TFMessage, 100)
+            fixed = self.advertise_transforms(name, '/tf_static')
             fixed.publish(transform(at(0), 'stand_%d' % k, 1))
             time.sleep(0.2)
             self.to['table'].publish(sheet(at(0), 1, 'stand_%d' % k))
