@@ -5,11 +5,12 @@ import sys
 import time
 
 import rospy
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, TransformStamped
 from deformable_ccd.msg import MeshStamped
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import MeshTriangle
+from tf2_msgs.msg import TFMessage
 
 sys.path += [str(pathlib.Path(__file__).resolve().parents[1] / 'faults'),
              str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib')]
@@ -17,6 +18,7 @@ from live_node import Cloud, LiveNodeTest, grid_faces, resident_kb  # noqa: F401
 from ros_process import SLOW, wait_for  # noqa: F401
 
 ROWS, COLS = 20, 30
+TODAY = 1700000000  # [s]
 
 
 def peak_kb(pid):
@@ -109,13 +111,44 @@ def be_silent(topic, kind):
     return publisher
 
 
+def publish_transforms(frame, begin_s, rate=20.0):
+    """Of a frame that stands still; its clock began with TODAY when the steady one had this time."""
+    rospy.init_node('transforms', anonymous=True)
+    publisher = rospy.Publisher('/tf', TFMessage, queue_size=10)
+    while not rospy.is_shutdown():
+        one = TransformStamped(child_frame_id=frame)
+        one.header.frame_id = 'world'
+        one.header.stamp = rospy.Time.from_sec(TODAY + time.monotonic() - begin_s)
+        one.transform.rotation.w = 1
+        publisher.publish(TFMessage([one]))
+        time.sleep(1 / rate)
+
+
+def publish_shifted(frame, by_m):
+    """Each transform of a frame that another one sends, once more, higher."""
+    rospy.init_node('shifted', anonymous=True)
+    publisher = rospy.Publisher('/tf', TFMessage, queue_size=10)
+
+    def shift(message):
+        if message._connection_header['callerid'] == rospy.get_name():
+            return
+        for one in message.transforms:
+            if one.child_frame_id == frame:
+                one.transform.translation.z += by_m
+                publisher.publish(TFMessage([one]))
+    rospy.Subscriber('/tf', TFMessage, shift)
+    rospy.spin()
+
+
 KINDS = {'cloud': (PointCloud2, flat_cloud), 'mesh': (MeshStamped, sheet_mesh)}
 
 
 def main(arguments):
-    """PROGRAM publish|silent KIND TOPIC"""
+    """PROGRAM publish|silent KIND TOPIC, transforms FRAME BEGIN_S, shifted FRAME BY_M"""
     from std_msgs.msg import String
     what, kind, topic = arguments
+    if what in ('transforms', 'shifted'):
+        return (publish_transforms if what == 'transforms' else publish_shifted)(kind, float(topic))
     message, make = KINDS.get(kind, (String, None))
     if what == 'publish':
         publish_stream(topic, make, message)

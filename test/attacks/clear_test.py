@@ -4,36 +4,55 @@ import os
 import pathlib
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
 
 import rosbag
 import rospy
-from attack import AttackTest, checkerboard, octomap, wait_for
+from attack import TODAY, AttackTest, checkerboard, octomap, wait_for
 from deformable_ccd.msg import MeshStamped
 from geometry_msgs.msg import Point, TransformStamped
 from live_node import Cloud, bytes_of
 from octomap_msgs.msg import Octomap
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from shape_msgs.msg import MeshTriangle
+from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
-START = 1700000000
-
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'storm'))
+from worlds import octree
 
 def at(seconds):
-    return rospy.Time(START) + rospy.Duration.from_sec(seconds)
+    return rospy.Time(TODAY) + rospy.Duration.from_sec(seconds)
+
+
+def grid(stamp, points, frame='world', rows=4):
+    cloud = Cloud(1, 1)
+    cloud.rows, cloud.cols = rows, len(points) // rows
+    cloud.variants = [b''.join(struct.pack('<3d', *point) for point in points)]
+    message = cloud.message()
+    message.header.stamp, message.header.frame_id = stamp, frame
+    return message
 
 
 def sheet(stamp, z, frame='world', rows=4, cols=5):
     """A level sheet, 0.3 m by 0.4 m around the origin."""
-    cloud = Cloud(1, 1)
-    cloud.rows, cloud.cols = rows, cols
-    cloud.variants = [b''.join(struct.pack('<3d', 0.1 * c - 0.2, 0.1 * r - 0.15, z) for r in range(rows) for c in range(cols))]
-    message = cloud.message()
-    message.header.stamp, message.header.frame_id = stamp, frame
-    return message
+    return grid(stamp, [(0.1 * c - 0.2, 0.1 * r - 0.15, z) for r in range(rows) for c in range(cols)], frame, rows)
+
+
+def depths(stamp, frame, depth_m):
+    """What a depth camera sends that has one depth everywhere."""
+    image = Image(width=32, height=32, encoding='32FC1', step=128, data=1024 * struct.pack('<f', depth_m))
+    image.header.stamp, image.header.frame_id = stamp, frame
+    return image
+
+
+def pinhole(stamp, frame):
+    info = CameraInfo(width=32, height=32, P=[32, 0, 15.5, 0, 0, 32, 15.5, 0, 0, 0, 1, 0])
+    info.header.stamp, info.header.frame_id = stamp, frame
+    return info
 
 
 def transform(stamp, child, z=0.0, turn=0.0):
@@ -50,7 +69,13 @@ class ClearTest(AttackTest):
             rospy.set_param('/%s/bodies/%s' % (name, key), value)
         self.start_node(name, publishes=False, clock_body='cloth', **parameters)
         self.to = {topic: self.advertise('/%s/%s' % (name, topic), PointCloud2, 100) for topic in topics}
-        self.tf = self.advertise('/tf', TFMessage, 100)
+        self.tf = self.advertise_transforms(name, '/tf')
+
+    def advertise_transforms(self, name, topic):
+        """To this node: one of before may still listen, and what is sent until this one does is lost to it."""
+        publisher = self.advertise(topic, TFMessage, 100)
+        wait_for(lambda: any(c.endpoint_id == '/' + name for c in publisher.impl.connections), 20, '%s to listen to %s' % (name, topic))
+        return publisher
 
     def step_of(self, stamp, z=0.0):
         """The cloth's frame; its outcome and the first state that is of it."""
@@ -216,7 +241,7 @@ class ClearTest(AttackTest):
         for k, by in enumerate((0.5, 0.0009)):
             name = 'static_%d' % k
             self.start_bodies(name, {'cloth/topic': '/%s/cloth' % name, 'table/topic': '/%s/table' % name, 'table/motion': 'static'}, ['cloth', 'table'])
-            fixed = self.advertise('/tf_static', TFMessage, 100)
+            fixed = self.advertise_transforms(name, '/tf_static')
             fixed.publish(transform(at(0), 'stand_%d' % k, 1))
             time.sleep(0.2)
             self.to['table'].publish(sheet(at(0), 1, 'stand_%d' % k))
@@ -236,6 +261,138 @@ class ClearTest(AttackTest):
             self.step_of(at(0.2))
             _, state = self.step_of(at(0.24))
             self.assertTrue(state.clear, state.reason)
+
+    def another_process(self, *arguments):
+        """Of another node, which sends transforms, too."""
+        process = subprocess.Popen([sys.executable, str(pathlib.Path(__file__).resolve().parent / 'attack.py'), *arguments])
+        self.addCleanup(self.end, process)
+        return process
+
+    def transforms_of(self, frame):
+        """A list into which those of the frame come, each with the name of the node that sent it."""
+        came = []
+
+        def hear(message):
+            came.extend((message._connection_header['callerid'], t) for t in message.transforms if t.child_frame_id == frame)
+        subscriber = rospy.Subscriber('/tf', TFMessage, hear)
+        self.addCleanup(subscriber.unregister)
+        return came
+
+    def test_two_publishers_of_a_frame_that_carries_nothing(self):
+        """Of which the other's clock is 1.5 s ahead. What carries the finger stays known: each step is answered and proved."""
+        self.start_with_finger('apart')
+        came, begin, steps = self.transforms_of('spinner'), time.monotonic(), 0
+        self.another_process('transforms', 'spinner', repr(begin - 1.5))
+        wait_for(lambda: came, 20, 'the other one')
+        before = len(came)
+        while len(came) < before + 60:
+            now_s = time.monotonic() - begin
+            self.tf.publish(transform(at(now_s), 'spinner', 5))
+            outcome, state = self.step_of_all(now_s)
+            self.assertTrue(steps == 0 or outcome.answered and state.clear, outcome.reason + state.reason)
+            steps += 1
+            time.sleep(0.04)
+        stamps = [t.header.stamp.to_sec() for _, t in came[before:]]
+        back = sum(later < earlier - 1 for earlier, later in zip(stamps, stamps[1:]))
+        self.assertGreater(min(back, steps), 10, 'stamps that went back by more than a second, steps')
+
+    def test_two_publishers_of_a_frame_that_carries_the_finger(self):
+        """With equal stamps, 0.4 m apart: nothing is clear while both send, and all of it is once one of them is gone."""
+        self.start_with_finger('torn', max_step_s=30.0)
+        came = self.transforms_of('finger')
+        self.step_of_all(0)
+        _, state = self.step_of_all(0.04)
+        self.assertTrue(state.clear, state.reason)
+        other, ours = self.another_process('shifted', 'finger', '0.4'), transform(at(0.04), 'finger', 3)
+        wait_for(lambda: self.tf.publish(ours) or len({sender for sender, _ in came}) == 2, 20, 'the other one', 0.2)
+        time.sleep(0.5)
+        for k in range(2, 7):
+            seen = len(came)
+            self.tf.publish(transform(at(0.04 * k), 'finger', 3))
+            wait_for(lambda: len(came) == seen + 2, 20, 'the other one')
+            self.assertEqual(*(t.header.stamp for _, t in came[-2:]))
+            self.assertAlmostEqual(abs(came[-1][1].transform.translation.z - came[-2][1].transform.translation.z), 0.4)
+            time.sleep(0.2)  # until the node has both
+            self.to['other'].publish(sheet(at(0.04 * k), 1))
+            outcome, state = self.step_of(at(0.04 * k))
+            self.assert_unknown(outcome, state, 'finger', "a transform of frame 'finger' came")
+        other.kill()
+        other.wait()
+        self.assert_recovers(0.04 * (k + 1))
+
+    def test_a_camera_that_measures_nothing(self):
+        """All of its points are at its own place, or not a number: that is no map, and the reason says so. Good ones are one."""
+        nothing, nan, plate = 20 * [(0, 0, 0)], 20 * [(math.nan,) * 3], [(0.1 * c, 0.1 * r, 2) for r in range(4) for c in range(5)]
+        cases = {'zeros': (PointCloud2, lambda t, good: grid(t, plate if good else nothing, 'camera'), 'none of its 20 points is a measurement: 20 at the sensor'),
+                 'nan': (PointCloud2, lambda t, good: grid(t, plate if good else nan, 'camera'), 'none of its 20 points is finite'),
+                 'picture': (Image, lambda t, good: depths(t, 'camera', 2 if good else 0), 'none of its 1024 points is a measurement: 1024 at the sensor')}
+        for name, (kind, make, why) in cases.items():
+            self.start_bodies(name, {'cloth/topic': '/%s/cloth' % name}, ['cloth'], obstacle_resolution_m=0.1, max_step_s=30.0,
+                              **{'effects/octomap': 'on', 'obstacle_cloud_topic': '/%s/camera/points' % name})
+            sensor = self.advertise('/%s/camera/points' % name, kind, 100)
+            infos = rospy.Publisher('/%s/camera/camera_info' % name, CameraInfo, queue_size=100)
+            self.addCleanup(infos.unregister)
+            t = 0
+            for good in (False, True, False):
+                for k in range(4):
+                    t += 0.04
+                    self.tf.publish(transform(at(t), 'camera', -3))
+                    infos.publish(pinhole(at(t), 'camera'))
+                    time.sleep(0.1)  # it is there before the picture
+                    sensor.publish(make(at(t), good))
+                    time.sleep(0.2)  # and its map before the frame
+                    outcome, state = self.step_of(at(t + 0.02))
+                    if k == 0:  # the first frame; or one of whose step the camera said both
+                        wait_for(lambda: kind != Image or infos.get_num_connections() > 0, 20, 'the node to ask for its CameraInfo')
+                        continue
+                    with self.subTest(name=name, good=good, k=k):
+                        self.assertEqual(state.clear, good, state.reason)
+                        if not good:
+                            self.assertFalse(state.proved)
+                            self.assertIn(why, state.reason)
+
+    def test_a_cloth_that_is_carried_while_the_monitor_is_not_enabled(self):
+        """Its own voxels are followed for those two seconds: maps that show it where it rests then show no obstacle."""
+        self.start_with_map('rests', own_voxels_m=0.1, max_step_s=30.0)
+        floor = [(i, j, -10) for i in range(-4, 5) for j in range(-4, 5)]
+        seen = {(i, j, k) for i in range(-4, 5) for j in range(-4, 5) for k in range(-9, 15)}
+
+        def map_at(seconds, z=None):
+            cloth = [] if z is None else [(i, j, math.floor(z / 0.1)) for i in range(-2, 2) for j in range(-2, 2)]
+            keys, free = ([tuple(32768 + x for x in cell) for cell in cells] for cells in (floor + cloth, seen.difference(cloth)))
+            self.maps.publish(octomap(bytes(b & 255 for b in octree(keys, free)), at(seconds), resolution=0.1))
+        map_at(0)
+        time.sleep(0.5)
+        self.step_of(at(0), 0.55)
+        _, state = self.step_of(at(0.04), 0.55)
+        self.assertTrue(state.clear, state.reason)
+        map_at(0.06, 0.55)
+        time.sleep(0.5)
+        self.step_of(at(0.08), 0.55)
+        _, state = self.step_of(at(0.12), 0.55)
+        self.assertTrue(state.clear, state.reason)
+        self.assertIn("as own of body 'cloth'", ' '.join(state.excluded))
+        enable = rospy.ServiceProxy('/rests/enable', SetBool)
+        enable(False)
+        wait_for(lambda: not self.states[-1].clear, 20, 'a state that is not clear')
+        answered = len(self.contacts)
+        for k in range(60):
+            t, z = 0.12 + (k + 1) / 30, 0.55 + 0.3 * min(1, k / 45)
+            self.to['cloth'].publish(sheet(at(t), z))
+            if k % 6 == 5:
+                map_at(t, z)
+            time.sleep(1 / 30)
+        time.sleep(0.5)
+        self.assertEqual(len(self.contacts), answered)
+        enable(True)
+        for k in range(4):
+            t += 0.04
+            map_at(t, z)
+            time.sleep(0.3)
+            outcome, state = self.step_of(at(t + 0.02), z)
+        self.assertTrue(outcome.answered)
+        self.assertTrue(state.clear, state.reason)
+        self.assertIn("as own of body 'cloth'", ' '.join(state.excluded))
 
     def test_live_and_from_a_bag(self):
         """A crumpled cloth in a frame that turns; live the newest transform is the frame's own, in a bag later ones are known."""

@@ -319,6 +319,48 @@ TEST_P(ClearanceSteps, HoldTheTruth) {
   }
 }
 
+// Bodies that come near, cross, rest and come apart again, a stream of steps: what is said of each is what is said of
+// it alone, and TOUCHING at its end whenever surfaces cross there.
+TEST_P(ClearanceSteps, AreTheSameInAStream) {
+  const int usual = coordinates() == Coordinates::EXTREME ? 4 : 20, streams = longRun() ? 25 * usual : usual;
+  int crossing = 0, apart = 0;
+  for (int seed = 0; seed < streams; ++seed) {
+    const Draw draw = drawFrom(9900 + static_cast<std::uint64_t>(seed));
+    const TestStep first = randomStep(draw, draw(6, 14), coordinates());
+    Step step = first.motion();  // its bodies stay: what is known of one that is another body is forgotten
+    for (Body& body : step.bodies) body.reference = share(ReferenceFrame{*body.t0, {}});
+    Options options;
+    options.clearance.wanted = true;
+    options.clearance.max_m = std::ldexp(1.0, draw(-4, 29));
+    options.clearance.self_m = std::ldexp(1.0, draw(-40, 3));
+    Detector stream(options);
+    for (int i = 0; i < 6; ++i) {
+      const Outcome carried = stream.run(step), alone = Detector(options).run(step);
+      ASSERT_EQ(carried.clearances.size(), alone.clearances.size()) << "seed " << seed << ", step " << i;
+      for (std::size_t r = 0; r < alone.clearances.size(); ++r) {
+        const Clearance &one = carried.clearances[r], &other = alone.clearances[r];
+        for (const auto& [carried_on, as_first] :
+             {std::pair(&one.at_end, &other.at_end), std::pair(&one.over_step, &other.over_step)}) {
+          ASSERT_EQ(toString(carried_on->status), std::string(toString(as_first->status)))
+              << "seed " << seed << ", step " << i << ", row " << r;
+        }
+        ++(one.at_end.status == ClearanceStatus::TOUCHING ? crossing : apart);
+      }
+      ASSERT_EQ(judgeClearances(step, options, carried, 0), "") << "seed " << seed << ", step " << i;
+      for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+        Body& body = step.bodies[b];
+        body.t0 = body.t1;
+        const int way = draw(0, 3);  // it rests, goes back to where it was at the very first, or goes on
+        if (way == 1) body.t1 = share(body.reference->positions);
+        if (way > 1) body.t1 = share(randomMotion(draw, *body.t0, coordinates()));
+      }
+    }
+  }
+  std::cout << crossing << " rows touch at their step's end, " << apart << " do not\n";
+  if (coordinates() != Coordinates::EXTREME) EXPECT_GT(crossing, streams / 2);
+  EXPECT_GT(apart, streams / 2);
+}
+
 std::string nameOf(const testing::TestParamInfo<int>& info) {
   static const char* const NAMES[] = {"SmallIntegers", "FewBits", "Real",       "LittleMotion", "HugeOffset",
                                       "Flat",          "AtRest",  "Coincident", "Subnormal",    "Extreme"};

@@ -321,6 +321,31 @@ TEST_F(Changing, APhaseThatEndsTakesThePromiseWithIt) {
   EXPECT_TRUE(called("/changing/set_hold", open).success);
 }
 
+// No promise speaks of what a live parameter changes: expectations, bodies and bounds are changed by services.
+TEST_F(Changing, ALiveParameterLeavesThePromiseAsItIs) {
+  EXPECT_TRUE(moveTo(0.3, begin_s + 0.1).clear);
+  EXPECT_GT(promisedAt(begin_s + 0.1).seconds, 0);
+  const std::size_t promised = promises.count();
+  const std::uint64_t broken = stats.after(0).promises_broken;
+  dynamic_reconfigure::Reconfigure call;
+  ASSERT_TRUE(ros::service::call("/changing/live/set_parameters", call));
+  const auto before = call.response.config;
+  call.request.config = before;
+  for (auto& value : call.request.config.ints) value.value = value.name == "max_contacts" ? 77 : value.value;
+  for (auto& value : call.request.config.doubles) value.value *= value.name == "step_budget_ms" ? 1 : 1.5;
+  ASSERT_TRUE(ros::service::call("/changing/live/set_parameters", call));
+  ros::Duration(0.3).sleep();
+  EXPECT_EQ(promises.count(), promised) << promises.last().reason;
+  for (const State& one : state.all())
+    EXPECT_TRUE(one.clear || one.holds_until != ros::Time(begin_s + 0.1)) << one.reason;
+  EXPECT_TRUE(moveTo(0.3, begin_s + 0.2).clear);
+  EXPECT_EQ(promisedAt(begin_s + 0.2).broken, "");
+  EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(begin_s + 0.2); }));
+  EXPECT_EQ(stats.last().promises_broken, broken);
+  call.request.config = before;
+  ASSERT_TRUE(ros::service::call("/changing/live/set_parameters", call));
+}
+
 TEST_F(Changing, ADescriptionThatChangesIsNotVouchedForUntilItIsBack) {
   EXPECT_TRUE(moveTo(0.3, begin_s + 0.1).clear);
   std::string urdf;
