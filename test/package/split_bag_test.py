@@ -7,7 +7,7 @@ import genpy
 from tf2_msgs.msg import TFMessage
 
 from analyze_bag_support import AnalyzeBagTestCase
-from bag_messages import by_topic, transform, write_bag
+from bag_messages import by_topic, messages_of, transform, write_bag
 from checkout import TOOLS, run
 
 TABLES = ('contacts.csv', 'steps.csv', 'patches.csv', 'events.csv')
@@ -83,11 +83,14 @@ class SplitBagTest(AnalyzeBagTestCase):
         start = self.messages[0][2]
         two = self.write('two.bag', [('/tf_static', TFMessage([transform('camera', z=z)]), start) for z in (0, 1)])
         self.assertIn("two.bag: its /tf_static has 'camera' at two places", self.ran(self.pieces[1], '--tf-static', two).stderr)
-        # What a bag says itself holds.
+        # What a bag says itself holds, also where it was recorded late.
         high = self.write('high.bag', [('/tf_static', TFMessage([transform('camera', z=50)]), start)])
-        self.assertEqual(self.ran(self.whole, '--tf-static', high).returncode, 0)
-        self.assertEqual(self.ran(self.whole).returncode, 0)
-        self.assertIn('First contact', self.ran(self.whole, '--tf-static', high).stdout)
+        (_, static, _), *rest = messages_of(self.whole)
+        late = self.write('late.bag', rest[:10] + [('/tf_static', static, rest[10][2])] + rest[10:])
+        said = [self.ran(late, *words) for words in ((), ('--tf-static', high))]
+        self.assertEqual([one.returncode for one in said], [0, 0], said[1].stderr)
+        self.assertIn('First contact', said[0].stdout)
+        self.assertEqual(said[0].stdout, said[1].stdout)
 
     def test_what_is_no_run_is_refused_and_a_pause_is_told(self):
         self.assertRegex(self.ran(self.whole, self.pieces[2]).stderr, 'whole.bag and .*_2.bag have /cloth at the same time')
