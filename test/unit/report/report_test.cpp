@@ -13,6 +13,7 @@ namespace {
 Outcome nothingFound(StepStatus status, StartState start) {
   Outcome outcome;
   outcome.answered = true;
+  outcome.claim.add(0, 1, {});
   outcome.status = status;
   outcome.start_state = start;
   if (status != StepStatus::OK) outcome.unproved.push_back(toString(status));
