@@ -121,7 +121,7 @@ void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::
   std::vector<const MarkerView*> things = taken;
   for (const MarkerView& marker : markers) {
     const bool by_choice = config_.source == TopologySource::POLYLINE && marker.type == MARKER_TRIANGLE_LIST;
-    const bool is_taken = std::find(taken.begin(), taken.end(), &marker) != taken.end();
+    const bool is_taken = std::binary_search(taken.begin(), taken.end(), &marker);  // they are in their order
     mesh.has_others = mesh.has_others || (!isWanted(marker) && mayBeThing(marker));
     if (!isWanted(marker) || !mayBeThing(marker) || by_choice || is_taken || isDrawnOfIt(marker)) continue;
     things.push_back(&marker);
@@ -129,7 +129,10 @@ void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::
                                                                        ? (marker.points.size + 2) / 3
                                                                        : std::max<std::size_t>(marker.points.size, 1));
   }
-  for (const std::string& name : shown_.show(things)) tell(name + ", which came before and was not deleted", 1);
+  if (const ShownMarkers::Left left = shown_.show(things); left.count > 0) {
+    tell(left.example + ", which came before and was not deleted", left.count);
+    mesh.unread_markers += left.count - 1;
+  }
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {

@@ -56,48 +56,37 @@ void MarkerNames::keep(const std::vector<const MarkerView*>& taken) {
   id_ = taken[0]->id;
 }
 
-bool ShownMarkers::Shown::isNamedAs(const MarkerView& marker) const {
-  return id == marker.id && ns == namespaceOf(marker);
-}
-
 void ShownMarkers::remove(const std::vector<MarkerView>& markers) {
   for (const MarkerView& marker : markers) {
     if (marker.action == MARKER_DELETE_ALL) shown_.clear();
-    if (marker.action != MARKER_DELETE) continue;
-    shown_.erase(std::remove_if(shown_.begin(), shown_.end(), [&](const Shown& one) { return one.isNamedAs(marker); }),
-                 shown_.end());
+    if (marker.action == MARKER_DELETE) shown_.erase({namespaceOf(marker), marker.id});
   }
 }
 
-std::vector<std::string> ShownMarkers::show(const std::vector<const MarkerView*>& markers) {
+ShownMarkers::Left ShownMarkers::show(const std::vector<const MarkerView*>& markers) {
   if (markers.empty()) return {};
   const StampNs now_ns = markers[0]->header.stamp_ns;
-  std::size_t stay = 0, before = 0;
-  for (std::size_t i = 0; i < shown_.size();) {
-    const Shown& one = shown_[i];
-    const bool stays =
-        std::any_of(markers.begin(), markers.end(), [&](const MarkerView* marker) { return one.isNamedAs(*marker); });
-    stay += stays;
-    before += !one.is_renamed;
-    if (stays || one.until_ns < now_ns) {
-      shown_.erase(shown_.begin() + static_cast<std::ptrdiff_t>(i));
-    } else {
-      ++i;
-    }
+  const auto named = [](const auto& one) { return !one.second.is_renamed; };
+  const auto before = static_cast<std::size_t>(std::count_if(shown_.begin(), shown_.end(), named));
+  std::size_t stay = 0;
+  for (const MarkerView* marker : markers) {
+    const auto [one, is_other] = shown_.try_emplace({namespaceOf(*marker), marker->id});
+    stay += !is_other;
+    one->second = {now_ns, true, false};
+    one->second.until_ns =
+        marker->lifetime_ns > 0 ? marker->header.stamp_ns + marker->lifetime_ns : std::numeric_limits<StampNs>::max();
   }
   const bool all_are_renamed = may_rename_ && stay == 0 && before == markers.size();
   const bool is_known_to_rename = std::exchange(renames_, all_are_renamed) && all_are_renamed;
-  std::vector<std::string> left;
-  for (Shown& one : shown_) {
-    one.is_renamed = all_are_renamed;
-    if (!is_known_to_rename) left.push_back(nameOf(one.ns, one.id));
+  Left left;
+  for (auto one = shown_.begin(); one != shown_.end();) {
+    const auto& [name, marker] = *one;
+    const bool is_new = std::exchange(one->second.is_new, false);
+    const bool goes = !is_new && (marker.until_ns < now_ns || shown_.size() > MOST_SHOWN + markers.size());
+    if (!is_new) one->second.is_renamed = all_are_renamed;
+    if (!is_new && !goes && !is_known_to_rename && left.count++ == 0) left.example = nameOf(name.first, name.second);
+    one = goes ? shown_.erase(one) : std::next(one);
   }
-  for (const MarkerView* marker : markers) {
-    const StampNs until_ns =
-        marker->lifetime_ns > 0 ? marker->header.stamp_ns + marker->lifetime_ns : std::numeric_limits<StampNs>::max();
-    shown_.push_back({namespaceOf(*marker), marker->id, until_ns, false});
-  }
-  while (shown_.size() > MOST_SHOWN + markers.size()) shown_.pop_front();
   return left;
 }
 

@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "input/mesh_views.h"
@@ -42,28 +44,31 @@ class MarkerNames {
 /// Markers that came before: each is shown until it is deleted, replaced by its name, or its lifetime is over.
 class ShownMarkers {
  public:
+  /// Those that came before the message and are shown still, beside it.
+  struct Left {
+    std::size_t count = 0;
+    std::string example;
+  };
   /// A stream may give all of its markers other names each time, and then it shows what it names last. That is believed
   /// from the second time on.
   explicit ShownMarkers(bool may_rename) : may_rename_(may_rename) {}
   /// What the message takes away.
   void remove(const std::vector<MarkerView>& markers);
-  /// The message shows these. Returns the names of those that came before and are shown still.
-  std::vector<std::string> show(const std::vector<const MarkerView*>& markers);
+  /// The message shows these.
+  Left show(const std::vector<const MarkerView*>& markers);
   void forget() {
     shown_.clear();
     renames_ = false;
   }
 
  private:
+  using Name = std::pair<std::string, std::int32_t>;
   struct Shown {
-    std::string ns;
-    std::int32_t id;
-    StampNs until_ns;
-    bool is_renamed;  ///< what came after it bore other names alone
-    bool isNamedAs(const MarkerView& marker) const;
+    StampNs until_ns = 0;
+    bool is_new = false, is_renamed = false;  ///< of this message; what came after it bore other names alone
   };
   bool may_rename_, renames_ = false;
-  std::deque<Shown> shown_;
+  std::map<Name, Shown> shown_;
 };
 
 }  // namespace dccd
