@@ -40,6 +40,9 @@ void expectCut(const Outcome& outcome, std::size_t limit) {
   EXPECT_TRUE(outcome.cut);
   EXPECT_FALSE(outcome.complete);
   EXPECT_FALSE(outcome.claim.holds());
+  const std::vector<Gap>& gaps = outcome.claim.gaps();
+  const bool any_pair = std::any_of(gaps.begin(), gaps.end(), [](const Gap& gap) { return !gap.at_start; });
+  EXPECT_EQ(any_pair, !outcome.allPairs()) << "some pairs were left out, and not of the start alone";
   EXPECT_LE(outcome.total_contacts, limit);
   EXPECT_LE(outcome.intersections.size(), limit);
   EXPECT_FALSE(assuranceOf(outcome).proved);

@@ -71,6 +71,9 @@ TEST(LooksAtTheClock, BetweenTwoLiesLittleWork) {
       const Outcome before = runFor(at, step, options), after = runFor(at + 1, step, options);
       EXPECT_FALSE(before.complete) << name << ", look " << at << " of " << looks;
       EXPECT_FALSE(before.claim.holds());
+      const std::vector<Gap>& gaps = before.claim.gaps();
+      const bool any_pair = std::any_of(gaps.begin(), gaps.end(), [](const Gap& gap) { return !gap.at_start; });
+      EXPECT_EQ(any_pair, !before.allPairs()) << name << ", look " << at << " of " << looks;
       const auto work_before = workOf(before.stats);
       for (const auto& [what, done] : workOf(after.stats)) {
         const std::uint64_t least = std::min(done.first, work_before.at(what).first);
