@@ -11,6 +11,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "dccd/tolerances.h"
+
 namespace dccd {
 
 using Vec3 = Eigen::Vector3d;  ///< metres, in the fixed frame unless a name says otherwise
@@ -25,6 +27,11 @@ inline double secondsBetween(StampNs from_ns, StampNs to_ns) {
   // Unsigned, for two stamps can be further apart than the largest of them.
   const auto from = static_cast<std::uint64_t>(from_ns), to = static_cast<std::uint64_t>(to_ns);
   return (to_ns < from_ns ? -static_cast<double>(from - to) : static_cast<double>(to - from)) * 1e-9;
+}
+/// What is stamped before the latest that came. Where stamps go back further, time begins anew.
+inline bool isLate(StampNs stamp_ns, StampNs latest_ns) {
+  const double late_s = secondsBetween(stamp_ns, latest_ns);
+  return late_s > 0 && late_s <= tolerance::LATE_FRAME_S;
 }
 
 /// A closed axis-aligned box.

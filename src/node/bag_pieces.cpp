@@ -1,14 +1,14 @@
 #include "node/bag_pieces.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <map>
 #include <optional>
 #include <regex>
+#include <stdexcept>
 #include <utility>
-
-#include "node/bag_reading.h"
 
 namespace dccd {
 namespace {
@@ -18,6 +18,8 @@ namespace fs = std::filesystem;
 /// The recorder goes on while it begins a new file, so that nothing but the time between two messages passes. Where the
 /// name has a date, nobody gave it by hand: then all may have been silent for longer.
 constexpr double PAUSE_S = 1, PAUSE_OF_DATED_S = 10;
+/// A longer pause than this between two bags is told.
+constexpr double LONG_PAUSE_S = 10;
 
 /// RUN_2026-01-31-12-00-00_3.bag, or RUN_3.bag: the recorder appends date, if it was not given a name, and number.
 struct PieceName {
@@ -169,6 +171,33 @@ std::vector<std::string> missingPieces(const std::vector<std::string>& bags, boo
     }
   }
   return sentences;
+}
+
+std::vector<std::string> pausesOfOneRun(const OpenBags& bags, const std::vector<std::string>& mesh_topics) {
+  const std::vector<std::string>& paths = bags.paths();
+  std::vector<std::string> pauses;
+  for (std::size_t i = 1; i < paths.size(); ++i) {
+    const std::optional<BagSpan> before = spanOf(paths[i - 1]), next = spanOf(paths[i]);
+    if (!before || !next || before->isEmpty() || next->isEmpty()) continue;
+    if (const double pause_s = (next->begin - before->end).toSec(); pause_s > LONG_PAUSE_S) {
+      pauses.push_back("nothing was recorded for " + std::to_string(std::lround(pause_s)) + " s between " +
+                       paths[i - 1] + " and " + paths[i]);
+    }
+  }
+  for (const std::string& topic : mesh_topics) {
+    std::optional<std::pair<std::size_t, ros::Time>> last;  // the bag with the latest end
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+      rosbag::View view(bags.bag(i), rosbag::TopicQuery(topic));
+      if (view.size() == 0) continue;
+      const ros::Time begin = view.getBeginTime(), end = view.getEndTime();
+      if (last && begin < last->second - ros::Duration(OUT_OF_ORDER_S)) {
+        throw std::runtime_error(paths[last->first] + " and " + paths[i] + " have " + topic +
+                                 " at the same time: they are no pieces of one run; analyse each by itself");
+      }
+      if (!last || end > last->second) last.emplace(i, end);
+    }
+  }
+  return pauses;
 }
 
 }  // namespace dccd

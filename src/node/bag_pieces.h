@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "node/bag_reading.h"
+
 namespace dccd {
 
 /// Pieces of one run together, first piece first; each other bag alone. By names, and by the times in their indices.
@@ -13,5 +15,9 @@ std::vector<std::vector<std::string>> groupedByRun(const std::vector<std::string
 /// What is missing of the recordings that these bags are pieces of, a sentence each. `lacks_something`: transforms or a
 /// map; then a name alone is enough to ask for the pieces before it.
 std::vector<std::string> missingPieces(const std::vector<std::string>& bags, bool lacks_something);
+
+/// Long pauses between bags, a sentence each. Throws std::runtime_error where two bags have one of the topics at the
+/// same time: of meshes that overlap nobody could tell which frame is where.
+std::vector<std::string> pausesOfOneRun(const OpenBags& bags, const std::vector<std::string>& mesh_topics);
 
 }  // namespace dccd

@@ -208,6 +208,10 @@ std::optional<BagSpan> spanOf(const std::string& path) {
   }
 }
 
+std::string bagTopic(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
+
+StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
+
 OpenBags::OpenBags(const std::vector<std::string>& paths) : paths_(paths) {
   for (std::size_t i = 0; i < paths.size(); ++i) {
     std::error_code error;

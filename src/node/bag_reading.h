@@ -28,6 +28,10 @@ constexpr double OUT_OF_ORDER_S = 0.1;
 /// By the bag's index alone. None: it cannot be read.
 std::optional<BagSpan> spanOf(const std::string& path);
 
+/// A topic as bags name it.
+std::string bagTopic(const std::string& topic);
+StampNs receiptOf(const rosbag::MessageInstance& message);
+
 /// The bags of one run, as if they were one: messages come in the order of their times.
 class OpenBags {
  public:

@@ -1,7 +1,6 @@
 #include "node/bag_replay.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iomanip>
 #include <map>
 #include <optional>
@@ -9,12 +8,14 @@
 #include <sstream>
 
 #include <rosbag/view.h>
+#include <tf2/exceptions.h>
 
 #include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "input/message_type.h"
 #include "input/short_text.h"
 #include "input/transforms.h"
+#include "node/bag_clouds.h"
 #include "node/bag_pieces.h"
 #include "octomap/coarser.h"
 #include "output/output_messages.h"
@@ -24,17 +25,11 @@ namespace dccd {
 namespace {
 
 constexpr std::size_t MOST_NAMES = 6;
-// A longer pause than this between two bags is told.
-const ros::Duration LONG_PAUSE(10.0);
-
-std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
 /// As the words of an error begin.
 std::string bagsInWords(const std::vector<std::string>& paths) {
   return paths.front() + (paths.size() == 1 ? "" : " and " + std::to_string(paths.size() - 1) + " more");
 }
-
-StampNs receiptOf(const rosbag::MessageInstance& message) { return static_cast<StampNs>(message.getTime().toNSec()); }
 
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
 LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config, const MapMemory& memory) {
@@ -45,56 +40,6 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
   if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
   return map;
 }
-
-/// Clouds of a bag, of which one of each source waits while the fixed frame is not known: the newest.
-class BagClouds {
- public:
-  BagClouds(const MonitorConfig& config, const TransformFeed& feed, const MapMemory& memory)
-      : clouds_(config, feed, memory), held_(config.clouds.size()) {
-    for (std::size_t source = 0; source < config.clouds.size(); ++source) {
-      const std::string& topic = config.clouds[source].topic;
-      by_topic_[topic] = source;
-      by_info_topic_[absolute(cameraInfoTopic(config.clouds[source]))].push_back(source);
-    }
-  }
-
-  std::size_t sourceOf(const std::string& topic) const { return by_topic_.at(topic); }
-  std::vector<std::string> infoTopics() const {
-    std::vector<std::string> topics;
-    for (const auto& one : by_info_topic_) topics.push_back(one.first);
-    return topics;
-  }
-  void hearCameraInfo(const rosbag::MessageInstance& message) {
-    const auto sources = by_info_topic_.find(message.getTopic());
-    if (sources == by_info_topic_.end()) return;
-    const std::string problem = cameraInfoProblem(message.getDataType(), message.getMD5Sum());
-    for (const std::size_t source : sources->second) clouds_.setCameraInfo(source, problem, bytesOf(message));
-  }
-  void hold(const rosbag::MessageInstance& message) {
-    const std::size_t source = sourceOf(message.getTopic());
-    held_[source] = CloudMessage{source, message.getDataType(), bytesOf(message), receiptOf(message)};
-  }
-  void refuse(const rosbag::MessageInstance& message, const std::string& problem) {
-    clouds_.refuse(sourceOf(message.getTopic()), receiptOf(message), problem);
-  }
-  /// What the map is with each cloud that is held, once.
-  std::vector<LoadedMap> take(const std::string& fixed_frame) {
-    clouds_.setFrame(fixed_frame);
-    std::vector<LoadedMap> maps;
-    for (std::optional<CloudMessage>& one : held_) {
-      if (!one || !clouds_.hasFrame()) continue;
-      maps.push_back(clouds_.add(*std::exchange(one, std::nullopt), [] { return false; }));
-    }
-    return maps;
-  }
-  CloudCounters counters() const { return clouds_.counters(); }
-
- private:
-  CloudMapping clouds_;
-  std::map<std::string, std::size_t> by_topic_;
-  std::map<std::string, std::vector<std::size_t>> by_info_topic_;
-  std::vector<std::optional<CloudMessage>> held_;
-};
 
 }  // namespace
 
@@ -129,7 +74,7 @@ struct BagReplay::Run {
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
-      const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
+      const std::string topic = r.config_.bodies[b].isRigid() ? "" : bagTopic(r.config_.bodies[b].topic);
       summary.mesh_topics.push_back(topic);
       if (!topic.empty()) {
         bodies_of_topic[topic].push_back(b);
@@ -313,9 +258,9 @@ BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagRep
   }
   for (const BodyConfig& body : config_.bodies) {
     if (body.isRigid()) continue;
-    found |= topics_.count(absolute(body.topic)) > 0;
+    found |= topics_.count(bagTopic(body.topic)) > 0;
     named |= body.topic_named || config_.bodies.size() > 1;
-    wanted.push_back(absolute(body.topic));
+    wanted.push_back(bagTopic(body.topic));
   }
   for (const auto& [topic, type] : topics_) there.push_back(topic + " (" + type + ")");
   if (!found) {
@@ -329,38 +274,16 @@ BagReplay::BagReplay(std::vector<std::string> bags, MonitorConfig config, BagRep
                             "the lines"
                           : ""));
   }
-  requireOneRun(files);
-}
-
-/// Of meshes that overlap nobody could tell which frame is where; a long pause is told.
-void BagReplay::requireOneRun(const OpenBags& bags) {
-  for (std::size_t i = 1; i < paths_.size(); ++i) {
-    const std::optional<BagSpan> before = spanOf(paths_[i - 1]), next = spanOf(paths_[i]);
-    if (!before || !next || before->isEmpty() || next->isEmpty()) continue;
-    if (const ros::Duration pause = next->begin - before->end; pause > LONG_PAUSE) {
-      pauses_.push_back("nothing was recorded for " + std::to_string(std::lround(pause.toSec())) + " s between " +
-                        paths_[i - 1] + " and " + paths_[i]);
-    }
-  }
+  std::vector<std::string> meshes;
   for (const auto& [topic, type] : topics_) {
-    if (!findMeshType(type)) continue;
-    std::optional<std::pair<std::size_t, ros::Time>> last;  // the bag with the latest end
-    for (std::size_t i = 0; i < paths_.size(); ++i) {
-      rosbag::View view(bags.bag(i), rosbag::TopicQuery(topic));
-      if (view.size() == 0) continue;
-      const ros::Time begin = view.getBeginTime(), end = view.getEndTime();
-      if (last && begin < last->second - ros::Duration(OUT_OF_ORDER_S)) {
-        throw std::runtime_error(paths_[last->first] + " and " + paths_[i] + " have " + topic +
-                                 " at the same time: they are no pieces of one run; analyse each by itself");
-      }
-      if (!last || end > last->second) last.emplace(i, end);
-    }
+    if (findMeshType(type)) meshes.push_back(topic);
   }
+  pauses_ = pausesOfOneRun(files, meshes);
 }
 
 void BagReplay::chooseMapTopic() {
-  for (CloudSource& source : config_.clouds) source.topic = absolute(source.topic);
-  config_.octomap_topic = absolute(config_.octomap_topic);
+  for (CloudSource& source : config_.clouds) source.topic = bagTopic(source.topic);
+  config_.octomap_topic = bagTopic(config_.octomap_topic);
   const bool there = std::find(map_topics_.begin(), map_topics_.end(), config_.octomap_topic) != map_topics_.end();
   if (!config_.octomap_topic_named && !there && !map_topics_.empty()) config_.octomap_topic = map_topics_.front();
 }
@@ -368,7 +291,7 @@ void BagReplay::chooseMapTopic() {
 std::string BagReplay::mapSource() const {
   if (config_.takesMapFileAlone() || config_.cloud_named) return config_.mapName() + " (named)";
   if (config_.octomap_topic_named) return config_.octomap_topic + " (named)";
-  if (config_.octomap_topic == absolute(DEFAULT_OCTOMAP_TOPIC)) return config_.octomap_topic + " (default)";
+  if (config_.octomap_topic == bagTopic(DEFAULT_OCTOMAP_TOPIC)) return config_.octomap_topic + " (default)";
   return config_.octomap_topic + " (the first of the bag; nobody named one)";
 }
 
@@ -428,7 +351,7 @@ std::string BagReplay::firstMeshTopic(const std::vector<std::string>& bags, cons
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
-    const auto isTopic = [&](const std::string& cloud) { return absolute(cloud) == c->topic; };
+    const auto isTopic = [&](const std::string& cloud) { return bagTopic(cloud) == c->topic; };
     if (std::any_of(clouds.begin(), clouds.end(), isTopic) || isMonitorsMarkers(c->topic, types)) continue;
     if (meshTypeProblem(c->datatype, c->md5sum, c->msg_def).empty()) return c->topic;
   }

@@ -89,7 +89,6 @@ class BagReplay {
   std::vector<std::string> map_topics_;        // of the bag
   std::map<std::string, std::string> topics_;  // of the bag, with their types
 
-  void requireOneRun(const OpenBags& bags);
   void chooseMapTopic();
   std::string mapSource() const;
   std::string unheardMaps() const;

@@ -225,8 +225,8 @@ SensorView CloudMapping::read(const CloudMessage& message, Reading& reading) {
   }
   reading.view = std::move(view);
   const auto known = views_.find(reading.view);
-  const double late_s = known == views_.end() ? 0 : secondsBetween(reading.map.stamp_ns, known->second.stamp_ns);
-  if (late_s > 0 && late_s <= tolerance::LATE_FRAME_S) {
+  if (known != views_.end() && isLate(reading.map.stamp_ns, known->second.stamp_ns)) {
+    const double late_s = secondsBetween(reading.map.stamp_ns, known->second.stamp_ns);
     throw WireError("it is stamped " + std::to_string(late_s) + " s before one from there that is in the map");
   }
   return isDepthPicture(message.datatype) ? readPicture(message, reading) : readCloudOf(message, reading);

@@ -21,6 +21,10 @@ std::string seconds(double value) {
 
 }  // namespace
 
+std::string waitsTooLong(double answer_timeout_s) {
+  return "a newer map came and has not been in use for more than " + seconds(answer_timeout_s);
+}
+
 void Liveness::frame(std::int64_t name, std::int64_t now_ns) {
   newest_ = {name, now_ns};
   if (open_.size() < MAX_OPEN) open_.push_back(newest_);
@@ -91,8 +95,7 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
     add(Fault::Kind::NEWER_MAP,
         "a newer map came before the last frame that was answered, which was answered without it");
   } else if (!maps_.empty() && secondsBetween(maps_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
-    add(Fault::Kind::NEWER_MAP,
-        "a newer map came and has not been in use for more than " + seconds(limits_.answer_timeout_s));
+    add(Fault::Kind::NEWER_MAP, waitsTooLong(limits_.answer_timeout_s));
   }
   if (limits_.octomap_timeout_s > 0 && map_age_s_ >= 0 && answered_ns_ != NEVER &&
       map_age_s_ + secondsBetween(answered_ns_, now_ns) > limits_.octomap_timeout_s) {

@@ -24,6 +24,9 @@ struct Fault {
   std::string sentence;
 };
 
+/// Of a newer map that has had that long to be in use [s].
+std::string waitsTooLong(double answer_timeout_s);
+
 /// Not thread-safe. `now_ns`: of the watch.
 class Liveness {
  public:

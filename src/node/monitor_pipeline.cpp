@@ -166,8 +166,7 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   if (!map.hint.empty() && map_hints_.insert(map.hint).second) map_hint_ = map.hint;
   map_slow_ = map.slow;
   if (map.surface) map_lead_.add(map.stamp_ns, map.receipt_ns);
-  const double late_s = secondsBetween(map.stamp_ns, map_stamp_ns_);
-  map.is_late = late_s > 0 && late_s <= tolerance::LATE_FRAME_S;
+  map.is_late = isLate(map.stamp_ns, map_stamp_ns_);
   if (!map.is_late) map_stamp_ns_ = map.stamp_ns;
   unplaced_maps_.push_back({std::move(map), now_ns});
   limitUnplacedMaps();

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "input/transform_tracks.h"
+#include "node/liveness.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
@@ -140,10 +141,7 @@ void MonitorPipeline::nameNewerMap(std::int64_t came_ns, Outcome& outcome) const
 void MonitorPipeline::nameWaitingMap(std::int64_t now_ns, Outcome& outcome) const {
   const std::optional<std::int64_t> since_ns = monitor_->mapWaitsSince();
   if (!outcome.answered || !since_ns || secondsBetween(*since_ns, now_ns) <= config_.answer_timeout_s) return;
-  std::ostringstream text;
-  text << "a newer map came and has not been in use for more than " << std::setprecision(3) << config_.answer_timeout_s
-       << " s";
-  outcome.unproved.push_back(text.str());
+  outcome.unproved.push_back(waitsTooLong(config_.answer_timeout_s));
 }
 
 /// Where all stamps are ahead alike, it is the clock here that is behind, and nothing is apart in time.

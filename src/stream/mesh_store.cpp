@@ -144,8 +144,7 @@ StepStatus MeshStore::push(MeshFrame frame) {
 /// begins anew.
 StampNs MeshStore::lateAfter(StampNs stamp_ns) const {
   const StampNs latest_ns = empty() ? seen_until_ns_ : std::max(seen_until_ns_, newest().stamp_ns);
-  const double late_s = secondsBetween(stamp_ns, latest_ns);
-  return late_s > 0 && late_s <= tolerance::LATE_FRAME_S ? latest_ns : NEVER_NS;
+  return isLate(stamp_ns, latest_ns) ? latest_ns : NEVER_NS;
 }
 
 void MeshStore::replace(const MeshStore& before, StampNs next_ns) { seen_until_ns_ = before.lateAfter(next_ns); }

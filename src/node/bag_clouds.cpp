@@ -1,0 +1,51 @@
+#include "node/bag_clouds.h"
+
+#include <utility>
+
+#include "input/known_types.h"
+#include "input/message_bytes.h"
+#include "node/bag_reading.h"
+
+namespace dccd {
+
+BagClouds::BagClouds(const MonitorConfig& config, const TransformFeed& feed, const MapMemory& memory)
+    : clouds_(config, feed, memory), held_(config.clouds.size()) {
+  for (std::size_t source = 0; source < config.clouds.size(); ++source) {
+    by_topic_[config.clouds[source].topic] = source;
+    by_info_topic_[bagTopic(cameraInfoTopic(config.clouds[source]))].push_back(source);
+  }
+}
+
+std::vector<std::string> BagClouds::infoTopics() const {
+  std::vector<std::string> topics;
+  for (const auto& one : by_info_topic_) topics.push_back(one.first);
+  return topics;
+}
+
+void BagClouds::hearCameraInfo(const rosbag::MessageInstance& message) {
+  const auto sources = by_info_topic_.find(message.getTopic());
+  if (sources == by_info_topic_.end()) return;
+  const std::string problem = cameraInfoProblem(message.getDataType(), message.getMD5Sum());
+  for (const std::size_t source : sources->second) clouds_.setCameraInfo(source, problem, bytesOf(message));
+}
+
+void BagClouds::hold(const rosbag::MessageInstance& message) {
+  const std::size_t source = sourceOf(message);
+  held_[source] = CloudMessage{source, message.getDataType(), bytesOf(message), receiptOf(message)};
+}
+
+void BagClouds::refuse(const rosbag::MessageInstance& message, const std::string& problem) {
+  clouds_.refuse(sourceOf(message), receiptOf(message), problem);
+}
+
+std::vector<LoadedMap> BagClouds::take(const std::string& fixed_frame) {
+  clouds_.setFrame(fixed_frame);
+  std::vector<LoadedMap> maps;
+  for (std::optional<CloudMessage>& one : held_) {
+    if (!one || !clouds_.hasFrame()) continue;
+    maps.push_back(clouds_.add(*std::exchange(one, std::nullopt), [] { return false; }));
+  }
+  return maps;
+}
+
+}  // namespace dccd
