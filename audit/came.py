@@ -56,7 +56,7 @@ class Frame:
     frame: str
     positions: np.ndarray
     surface: Surface = None
-    unseen: np.ndarray = None  # of each vertex: it is not finite, or of no edge
+    unseen: np.ndarray = None  # of each vertex: it is not finite, or of no edge, and where no neighbour is that has one
     unchecked: int = 0         # faces that could not be used
     came: int = 0    # [ns] when the bag has it
     number: int = 0  # place among all messages
@@ -67,11 +67,6 @@ def grid(rows, cols):
     a = (np.arange(rows - 1)[:, None] * cols + np.arange(cols - 1)).ravel()
     faces = np.stack([np.stack([a, a + cols, a + 1], 1), np.stack([a + 1, a + cols, a + cols + 1], 1)], 1)
     return Surface(rows * cols, faces.reshape(-1, 3))
-
-
-def rope(points, begin=0):
-    i = np.arange(begin, begin + points - 1)
-    return np.stack([i, i + 1], 1)
 
 
 def fans(polygons, positions):
@@ -95,7 +90,7 @@ def welded(corners):
     """Corners of equal coordinates are one vertex, numbered by their first."""
     known, index, kept = {}, [], []
     for c in (corners + 0.0).tolist():  # -0.0 is 0.0
-        number = known.setdefault(tuple(c), len(known))
+        number = known.setdefault(tuple(None if x != x else x for x in c), len(known))
         if number == len(kept):
             kept.append(c)
         index.append(number)
@@ -154,7 +149,8 @@ class Reader:
     def read(self, message, kind, came, number):
         header = getattr(message, 'header', None)
         if kind == 'visualization_msgs/MarkerArray':
-            header = message.markers[0].header if message.markers else None
+            given = message.markers[:None if all(x.type == 4 for x in message.markers) else 1]  # of ropes the earliest counts
+            header = min((x.header for x in given), key=lambda one: one.stamp, default=None)
         if kind == 'pcl_msgs/PolygonMesh' and not message.header.frame_id:
             header = message.cloud.header
         stamp = header.stamp.to_nsec() if header and header.stamp.to_nsec() else came
@@ -165,10 +161,10 @@ class Reader:
             raise Refused('nothing says which vertices make the faces')
         if surface.vertices != len(positions):
             raise Refused('%d points, and a topology of %d' % (len(positions), surface.vertices))
-        if self.known is not None and surface is not self.known and surface.same_as(self.known):
-            surface = self.known
+        surface = self.known if self.known is not None and surface.same_as(self.known) else surface
         self.known = surface
-        unseen = ~np.isfinite(positions).all(1) | ~np.isin(np.arange(len(positions)), surface.used)
+        again = np.append(False, (positions[1:] == positions[:-1]).all(1)) & (not len(surface.faces))  # in a rope, as one before
+        unseen = ~np.isfinite(positions).all(1) | ~(np.isin(np.arange(len(positions)), surface.used) | again)
         return Frame(stamp, name, positions, surface, unseen, unchecked, came, number)
 
     def topology(self):
@@ -180,14 +176,11 @@ class Reader:
         if topology.get('source') == 'depth_image':
             raise NotCovered('a depth image as a body')
         if 'file' in topology:
-            mesh = self.files.mesh(topology['file'])
-            return mesh[1]
+            return self.files.mesh(topology['file'])[1]
         if topology.get('rows') and topology.get('cols'):
             return self.reuse(('grid', topology['rows'], topology['cols']), lambda: grid(topology['rows'], topology['cols']))
         if topology.get('source') == 'polyline':
-            each = len(positions) // self.ropes_in_rows
-            return self.reuse(('rope', len(positions), each), lambda: Surface(len(positions), lines=np.concatenate(
-                [rope(each, begin) for begin in range(0, len(positions), each)])))
+            return self.roped(positions, range(0, len(positions), len(positions) // self.ropes_in_rows))
         return None
 
     made, ropes_in_rows = (None, None), 1
@@ -196,6 +189,11 @@ class Reader:
         if self.made[0] != key:
             self.made = (key, make())
         return self.made[1]
+
+    def roped(self, points, begins):  # of equal neighbours the first is all
+        i = np.flatnonzero(np.append(True, (points[1:] != points[:-1]).any(1)) | np.isin(np.arange(len(points)), begins))
+        lines = np.stack([i[:-1], i[1:]], 1)[~np.isin(i[1:], begins)]
+        return self.reuse(('rope', len(points), lines.tobytes()), lambda: Surface(len(points), lines=lines))
 
     def PointCloud2(self, m):
         points = cloud_points(m)
@@ -237,33 +235,39 @@ class Reader:
         marker = self.settings.get('marker', {})
         mine = [x for x in given if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
                 and marker.get('namespace', x.ns) == x.ns and marker.get('id', x.id) == x.id]
-        soup = [x for x in mine if x.type == 11]
+        soup = [x for x in mine if x.type == 11] or [x for x in mine if x.type == 5 and len(mine) == 1]
         if not soup:
             return self.ropes(mine)
         if len({(x.ns, x.id) for x in soup}) > 1:
             raise NotCovered('several lists of triangles in a message')
-        corners = self.placed(soup[0], True)
-        if len(corners) % 3:
-            raise Refused('no whole number of triangles')
-        if self.weld is None or len(self.weld) != len(corners):
-            self.weld = welded(corners)[1]
-        first = np.unique(self.weld, return_index=True)[1]
-        if not (corners[first][self.weld] == corners).all():
+        size = 3 if soup[0].type == 11 else 2
+        corners = self.placed(soup[0], size == 3)
+        if len(corners) % size:
+            raise Refused('no whole number of triangles, or of segments')
+        fits = lambda weld: np.array_equal(corners[np.unique(weld, return_index=True)[1]][weld], corners, equal_nan=True)
+        if self.weld is None or len(self.weld) != len(corners) or size == 2 and not fits(self.weld):
+            self.weld = welded(corners)[1]  # of segments the ends are joined anew where some come apart
+        if not fits(self.weld):
             raise NotCovered('welded corners that come apart')
-        corners = corners[first]
-        faces, lost = fans(self.weld.reshape(-1, 3).tolist(), corners)
+        corners = corners[np.unique(self.weld, return_index=True)[1]]
+        cells = self.weld.reshape(-1, size)
+        if size == 2:
+            cells = cells[cells[:, 0] != cells[:, 1]]
+            return corners, self.reuse(('lines', len(corners), cells.tobytes()), lambda: Surface(len(corners), lines=cells)), 0
+        faces, lost = fans(cells.tolist(), corners)
         return corners, self.reuse(('soup', faces.tobytes()), lambda: Surface(len(corners), faces)), lost
 
     def ropes(self, markers):
         strips = [x for x in markers if x.type == 4 and len(x.points) > 1]
-        points = [x for x in markers if x.type in (7, 8)]
-        if len(strips) == 1 and not any(x.type == 5 for x in markers):
-            at = self.placed(strips[0], False)
-            if (at[0] == at[-1]).all():
-                raise NotCovered('a rope that ends where it begins')
-            return at, self.reuse(('rope', len(at)), lambda: Surface(len(at), lines=rope(len(at)))), 0
-        if len(points) == 1 and len(markers) == 1:
-            return self.placed(points[0], False), None, 0
+        if strips and not any(x.type == 5 for x in markers):
+            parts = [self.placed(x, False) for x in sorted(strips, key=lambda x: (x.ns, x.id))]
+            ends = [tuple(p[i]) for p in parts for i in (0, -1)]
+            if len(set(ends)) < len(ends):
+                raise NotCovered('ropes of which two ends are one')
+            at = np.concatenate(parts)
+            return at, self.roped(at, np.cumsum([0] + [len(p) for p in parts[:-1]])), 0
+        if len(markers) == 1 and markers[0].type in (7, 8):
+            return self.placed(markers[0], False), None, 0
         raise NotCovered('these markers: types %s' % sorted({x.type for x in markers}))
 
     def placed(self, m, scaled):
@@ -281,7 +285,7 @@ class Reader:
         points = np.array([(p.position.x, p.position.y, p.position.z) for p in m.poses], float).reshape(-1, 3)
         if len(points) < 2:
             raise Refused('fewer than two poses')
-        return points, self.reuse(('rope', len(points)), lambda: Surface(len(points), lines=rope(len(points)))), 0
+        return points, self.roped(points, [0]), 0
 
 
 # -- files --------------------------------------------------------------------------------------------------------------

@@ -150,12 +150,11 @@ class Owned:
         return found
 
     def follow(self):
-        w, before, own, doubt, remembered, missed = self.world, None, NONE, NONE, NONE, False
+        w, before, own, doubt, remembered = self.world, None, NONE, NONE, NONE
         ends = np.concatenate([points for some in self.every.values() for places in some for _, points, _ in places])
         box = np.stack(np.meshgrid(*zip(np.nanmin(ends, 0), np.nanmax(ends, 0))), -1).reshape(-1, 3)
         for m in w.maps:
             if m.problem:
-                missed = True
                 continue
             if before is not None and m.stamp < before.stamp:
                 raise NotCovered('maps whose stamps go back, and own voxels')
@@ -176,17 +175,17 @@ class Owned:
             for name in self.every:
                 ways = self.ways(name, (m if before is None else before).stamp - self.lag, m.stamp)
                 near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]
-                is_known = before is not None and not missed and (not w.tracks[name].moves or self.since(name) <= m.stamp)
+                is_known = before is not None and (not w.tracks[name].moves or self.since(name) <= m.stamp)
                 if is_known or self.trust:
                     own = np.union1d(own, near)
                 else:
                     doubt = np.union1d(doubt, near)
                 if len(self.moments) == 1:  # else nobody is certain of where it was
                     lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
-            if missed and not self.trust:
-                own, doubt = NONE, np.union1d(own, doubt)
+            # What was left, what appeared at a seam, after a gap or from outside of reach: of what may be own all may be in doubt.
+            doubt = np.unique(np.concatenate([doubt, own, fresh]))
             self.of[m.number] = own, doubt
-            remembered, before, missed = gone[lasts], m, False
+            remembered, before = gone[lasts], m
 
     def follow_clouds(self):
         """What no body ever reached until then is none's own, however often it was seen free before."""

@@ -212,13 +212,14 @@ class Stream:
     def __init__(self, name, frames, refused, transforms, fixed, max_step_ns):
         self.name, self.refused, self.transforms, self.fixed = name, refused, transforms, fixed
         self.every, self.max_step_ns = frames, max_step_ns  # in the order in which they came
-        self.taken, self.until, self.held, self.voided = 0, -1, [], []
+        self.taken, self.until, self.held, self.voided, self.latest = 0, -1, [], [], None
 
     def known(self):
         """What had come when it was said, by stamp. One that goes back voids all that has a later stamp."""
-        if self.transforms.said < self.until:
+        until = min(self.transforms.said, self.latest or self.transforms.said)
+        if until < self.until:
             self.taken, self.held, self.voided = 0, [], []
-        self.until = self.transforms.said
+        self.until = until
         while self.taken < len(self.every) and self.every[self.taken].came <= self.until:
             frame = self.every[self.taken]
             if self.held and self.held[-1].stamp > frame.stamp + NS:

@@ -20,7 +20,7 @@ import yaml
 
 CHECKOUT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 RESOLUTION_M = 0.02
-OCTOMAP, TRUTH_TOPIC, MAP_TOPIC, CLOUD_TOPIC = "octomap", "/truth/octomap", "/octomap_binary", "/camera/points"
+OCTOMAP, TRUTH_TOPIC, MAP_TOPIC, CLOUD_TOPIC = "octomap", "/truth/octomap", "/octomap_full", "/camera/points"
 # Where each scene's camera is and what floor it looks down at. The cell was seen before the bodies came, twice: were it seen more often,
 # what was free would need several hits to be occupied, and the map would show the bodies late.
 CAMERA = {"width": 120, "height": 90, "lost_share": 0.02, "empty_clouds": 2}
@@ -69,7 +69,7 @@ def derived_page(scene, setting):
     page.pop("expect")
     camera, floor = CELLS[scene]
     obstacle = page.setdefault("obstacle", {"topic": MAP_TOPIC, "solids": []})
-    obstacle["resolution_m"] = RESOLUTION_M
+    obstacle.update(topic=MAP_TOPIC, resolution_m=RESOLUTION_M, binary=False)
     obstacle["solids"].append({"box": floor})
     page["camera"] = {**CAMERA, **camera, **setting, "truth_topic": TRUTH_TOPIC,
                       # Faces lie within voxels; on the border between two, noise would decide which one is occupied.

@@ -24,7 +24,7 @@ WHAT = {
     "mixed-150": "The same from 1e-150 to 1e150.",
     "extreme": "Coordinates near the largest double.",
 }
-TIERS = ["coincidence", "double_batch", "bernstein", "double_double", "fixed_integer", "big_integer"]
+INTEGERS = ["fixed_integer", "big_integer"]
 
 
 def flattened(point, scale):
@@ -67,9 +67,21 @@ def picture(row):
     return "\n".join(text + ["</svg>", ""])
 
 
-def tiers(row):
-    total = sum(row["tiers"].values())
-    return ", ".join("%s %.0f %%" % (t.replace("_", " "), 100 * row["tiers"][t] / total) for t in TIERS if row["tiers"].get(t, 0) * 200 >= total)
+def by_integers(row):
+    """The share, in per cent, that no arithmetic of doubles decides."""
+    return "%.0f" % (100 * sum(row["tiers"].get(t, 0) for t in INTEGERS) / sum(row["tiers"].values()))
+
+
+def families(rows):
+    """Of each family its two kinds, vertex-face first."""
+    by_name = {}
+    for row in rows:
+        by_name.setdefault(row["family"], []).append(row)
+    return [(name, sorted(both, key=lambda row: row["kind"] != "vertex-face")) for name, both in by_name.items()]
+
+
+def of_both(rows, text_of):
+    return ", ".join(text_of(row) for row in rows)
 
 
 def microseconds(ns):
@@ -79,52 +91,53 @@ def microseconds(ns):
 def hard_page(result, folder):
     lines = ["# Hard cases", "",
              "`scripts/benchmark hard_cases` makes this page from random pairs of each family (`test/support/generators.h`, with fixed seeds).",
-             "The rational oracle of `oracle/`, which shares no code with `src/`, judges %d pairs of each family and kind. *Wrong* counts"
+             "The rational oracle of `oracle/`, which shares no code with `src/`, judges %d pairs of each family and kind; *wrong* counts verdicts"
              % result["hard"][0]["judged"],
-             "verdicts among these. `exact` has no wrong verdict, and each of its times is in the cell that the oracle's time is in: otherwise",
-             "the command fails. *Mean* and *worst* are the time of one pair on one core of %s (%s)."
+             "among these. `exact` has no wrong verdict, and each of its times is in the cell that the oracle's time is in: otherwise the command",
+             "fails. Of two figures the first is of a vertex and a face, the second of two edges. *Mean* and *worst* are of one pair on one core of",
+             "%s (%s). *By integers* is the share of pairs that doubles do not decide."
              % (result["machine"].get("processor", "this machine"), result["machine"].get("simd_target", "best target")),
              "Each picture shows one pair at t = 0 (grey), at t = 1 (black) and where it meets (red). Wide ranges are drawn by their logarithms.", "",
-             "| | family | kind | contacts | FCL wrong | `fast` wrong | `exact`: tiers | mean µs | worst µs |",
-             "|---|---|---|--:|--:|--:|---|--:|--:|"]
-    for row in result["hard"]:
-        name = "%s-%s.svg" % (row["family"], "vf" if row["kind"] == "vertex-face" else "ee")
-        with open(os.path.join(folder, name), "w") as out:
-            out.write(picture(row))
-        share = lambda n: "%d of %d" % (n, row["judged"])  # noqa: E731
-        lines.append("| ![%s](hard_cases/%s) | **%s** %s | %s | %s | %s | %s | %s | %s | %s |" % (
-            row["family"], name, row["family"], WHAT[row["family"]] if row["kind"] == "vertex-face" else "", row["kind"],
-            share(row["contacts"]), share(row["fcl_wrong"]), share(row["fast_wrong"]), tiers(row), microseconds(row["exact_ns"]),
-            microseconds(row["exact_worst_ns"])))
+             "| | family | contacts | FCL wrong | `fast` wrong | `exact`: by integers, % | mean µs | worst µs |",
+             "|---|---|--:|--:|--:|--:|--:|--:|"]
+    for family, both in families(result["hard"]):
+        names = ["%s-%s.svg" % (family, kind) for kind in ("vf", "ee")]
+        for row, name in zip(both, names):
+            with open(os.path.join(folder, name), "w") as out:
+                out.write(picture(row))
+        lines.append("| ![%s](hard_cases/%s) ![](hard_cases/%s) | **%s** %s | %s | %s | %s | %s | %s | %s |" % (
+            family, *names, family, WHAT[family], *(of_both(both, lambda row, key=key: "%d" % row[key])
+                                                    for key in ("contacts", "fcl_wrong", "fast_wrong")),
+            of_both(both, by_integers), *(of_both(both, lambda row, key=key: microseconds(row[key])) for key in ("exact_ns", "exact_worst_ns"))))
     return lines
 
 
 def cliffs_page(result):
-    rows = [(r, r["exact_ns"] / r["perturbed"]["exact_ns"]) for r in result["cliffs"]]
-    worst = max(rows, key=lambda r: r[1])
+    def ratio(row):
+        return row["exact_ns"] / row["perturbed"]["exact_ns"]
+
+    worst = max(result["cliffs"], key=ratio)
     lines = ["", "## Ordinary input", "",
-             "Sheets as people and simulators make them, and the same with the last bits of every coordinate changed "
-             "(`scripts/benchmark cliffs`):",
-             "nanoseconds a pair over the pairs whose boxes meet. The largest ratio is %.1f (%s, %s)."
-             % (worst[1], worst[0]["family"], worst[0]["kind"]), "",
-             "| two sheets | kind | pairs | `exact` | perturbed | ratio | `fast` | `fast` wrong | FCL wrong | tiers |",
-             "|---|---|--:|--:|--:|--:|--:|--:|--:|---|"]
-    for row, ratio in rows:
-        lines.append("| %s | %s | %d | %.0f | %.0f | %.1f | %.0f | %d of %d | %d of %d | %s |" % (
-            row["family"], row["kind"], row["pairs"], row["exact_ns"], row["perturbed"]["exact_ns"], ratio, row["fast_ns"],
-            row["fast_wrong"], row["judged"], row["fcl_wrong"], row["judged"], tiers(row)))
+             "Sheets as people and simulators make them, and the same with the last bits of every coordinate changed (`scripts/benchmark cliffs`): "
+             "nanoseconds a", "pair over the pairs whose boxes meet, of which about %d of each row and kind are judged. The largest ratio is %.1f (%s, %s)."
+             % (result["cliffs"][0]["judged"], ratio(worst), worst["family"], worst["kind"]), "",
+             "| two sheets | `exact` | perturbed | ratio | `fast` | `fast` wrong | FCL wrong | by integers, % |",
+             "|---|--:|--:|--:|--:|--:|--:|--:|"]
+    for family, both in families(result["cliffs"]):
+        lines.append("| %s | %s | %s | %s | %s | %s | %s | %s |" % (
+            family, of_both(both, lambda row: "%.0f" % row["exact_ns"]), of_both(both, lambda row: "%.0f" % row["perturbed"]["exact_ns"]),
+            of_both(both, lambda row: "%.1f" % ratio(row)), *(of_both(both, lambda row, key=key: "%.0f" % row[key])
+                                                              for key in ("fast_ns", "fast_wrong", "fcl_wrong")), of_both(both, by_integers)))
     return lines
 
 
 def margins_page(table):
     return ["", "## Margins", "",
-            "Each margin of `include/dccd/tolerances.h` covers rounding. Its derivation stands beside the code. This table shows that it is",
-            "needed: the test cuts one margin at a time and asks exact arithmetic about inputs that aim at its bound. Some of these were found",
-            "by search (`cut_margins --search`). With the whole margin no input may go wrong; with less of it, one must. The last column is the",
-            "largest part of the margin with which one does. It is below a tenth where the bound adds up dozens of roundings, or where one margin",
-            "serves several quantities: there search found no input that needs more. A 0 stands where the margin covers underflow: it is a normal",
-            "number, and so far larger than what it covers. `scripts/test --long --only margins` runs the test.",
-            ""] + table
+            "Each margin of `include/dccd/tolerances.h` covers rounding, and its derivation stands beside the code. The test cuts one margin at a time and",
+            "asks exact arithmetic about inputs that aim at its bound (some found by `cut_margins --search`). With the whole margin no input may go wrong;",
+            "with less of it, one must. The last column is the largest part of the margin with which one does. It is below a tenth where the bound adds up",
+            "dozens of roundings, or where one margin serves several quantities, and 0 where the margin covers underflow: it is far larger than what it",
+            "covers. `scripts/test --long --only margins` runs the test.", ""] + table
 
 
 def main():
@@ -143,7 +156,7 @@ def main():
             lines += margins_page(table.read().splitlines())
     path = os.path.join(arguments.out, "hard_cases.md")
     with open(path, "w") as out:
-        out.write("\n".join(lines).strip().replace("**  |", "** |") + "\n")
+        out.write("\n".join(lines).strip() + "\n")
     print(path)
 
 

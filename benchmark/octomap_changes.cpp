@@ -156,7 +156,7 @@ std::vector<nlohmann::json> measureOwnVoxels(int repeat) {
       ms[which] = watch.milliseconds();
     }
     if (k < MAP_EVERY * 5) continue;
-    if (outcome[1].total_contacts != outcome[0].total_contacts || !outcome[1].unproved.empty()) {
+    if (outcome[1].total_contacts != outcome[0].total_contacts || !outcome[1].claim.holds()) {
       throw std::runtime_error("own voxels change the answer");
     }
     own += outcome[1].step->map.own.own;

@@ -25,7 +25,7 @@ set(DECODER_SOURCES ${MESSAGE_TYPES}
   src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_layout.cpp src/input/message_type.cpp
   src/input/obj_file.cpp src/input/ply_file.cpp src/input/ply_header.cpp src/input/polygons.cpp
   src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp src/node/map_decode.cpp
-  src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
+  src/node/map_memory.cpp src/octomap/map_odds.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
 
 # Clang 14 compiles these two kernels for many minutes, the more with every check that stands beside a load. They keep
 # AddressSanitizer here; `scripts/test --sanitize address,undefined` has GCC look at them in full.

@@ -55,5 +55,17 @@ struct Field {
 };
 py::dtype structured(std::vector<Field> fields, std::size_t bytes);
 
+/// *made, which the first who asks makes; it is never freed: at exit that would come after the interpreter's end. No
+/// static local of C++: to make it may let another Python thread in, which would wait for the static's guard and keep
+/// the interpreter's lock, for ever.
+template <class T, class Make>
+const T& onceMade(const T*& made, const Make& make) {
+  if (!made) {
+    const auto* const mine = new T(make());
+    if (!made) made = mine;  // another thread may have been faster; both are equal
+  }
+  return *made;
+}
+
 }  // namespace python
 }  // namespace dccd

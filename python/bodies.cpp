@@ -45,21 +45,11 @@ void setPoses(Body& body, py::handle pose_t0, py::handle pose_t1) {
   body.turns = true;
 }
 
-std::shared_ptr<const ReferenceFrame> referenceOf(py::handle positions, py::handle radius_m) {
-  if (positions.is_none()) {
-    if (!radius_m.is_none()) throw py::type_error("reference_radius_m goes with reference");
-    return nullptr;
-  }
-  ReferenceFrame reference{*positionsOf(positions, "reference"), {}};
-  if (!radius_m.is_none()) reference.radius_m = *radiiOf(radius_m, "reference_radius_m");
-  return share(std::move(reference));
-}
-
 NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::object edges, const TopologyPtr& mesh,
                    const std::string& name, bool rigid, bool fixed, bool self_collision, bool against_bodies,
                    bool against_obstacle, bool shell, double minimum_separation_m, py::object vertex_mask,
-                   const std::map<std::string, double>& separations_m, py::object reference,
-                   py::object reference_radius_m, py::object radius_m, py::object pose_t0, py::object pose_t1) {
+                   const std::map<std::string, double>& separations_m, py::object reference, py::object radius_m,
+                   py::object pose_t0, py::object pose_t1) {
   NamedBody made;
   Body& body = made.body;
   const std::shared_ptr<const Positions> start = t0.is_none() ? nullptr : positionsOf(t0, "t0");
@@ -76,7 +66,7 @@ NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::objec
   body.shell = shell;
   body.minimum_separation_m = minimum_separation_m;
   if (!vertex_mask.is_none()) body.vertex_mask = verticesOf(vertex_mask, "vertex_mask");
-  body.reference = referenceOf(reference, reference_radius_m);
+  if (!reference.is_none()) body.reference = positionsOf(reference, "reference");
   if (!radius_m.is_none()) {
     body.radius_m = radiiOf(radius_m, "radius_m");
     if (body.radius_m->size() != body.topology->vertexCount()) {
@@ -120,8 +110,6 @@ separations_m : dict
     From a body's name, 'self' or 'octomap' to the separation [m] that takes the place of minimum_separation_m there.
 reference : (n, 3) float64 [m]
     Where the body was fit: features that are closer there than the separation are neighbours, no contact.
-reference_radius_m : (n,) float64 [m]
-    The largest radius_m of the steps to come: neighbours are also those that only it brings as close.
 radius_m : (n,) float64 [m]
     How far off each position may be; adds to the separation. Needs accuracy='conservative'.
 pose_t0, pose_t1 : (4, 4) float64
@@ -166,20 +154,8 @@ void bindWhatItIs(Class& c) {
       },
       "(k,) uint32: vertices that are left out");
   c.def_property_readonly(
-      "reference",
-      [](const NamedBody& b) {
-        const auto& reference = b.body.reference;
-        return reference ? arrayOf(std::shared_ptr<const Positions>(reference, &reference->positions)) : py::none();
-      },
+      "reference", [](const NamedBody& b) { return arrayOf(b.body.reference); },
       "(n, 3) float64 [m], read-only: where it was fit; None: nowhere");
-  c.def_property_readonly(
-      "reference_radius_m",
-      [](const NamedBody& b) {
-        const auto& reference = b.body.reference;
-        if (!reference || reference->radius_m.empty()) return py::object(py::none());
-        return radiiArray(std::shared_ptr<const std::vector<double>>(reference, &reference->radius_m));
-      },
-      "(n,) float64 [m], read-only: the largest radius_m that neighbours are found for; None: none");
   c.def_property_readonly(
       "radius_m", [](const NamedBody& b) { return radiiArray(b.body.radius_m); },
       "(n,) float64 [m], read-only: how far off each position may be; None: they are exact");
@@ -283,13 +259,11 @@ void bindBody(py::module_& m) {
         "edges"_a = py::none(), "mesh"_a = py::none(), "name"_a = "", "rigid"_a = false, "static"_a = false,
         "self_collision"_a = true, "against_bodies"_a = true, "against_obstacle"_a = true, "shell"_a = false,
         "minimum_separation_m"_a = 0.0, "vertex_mask"_a = py::none(),
-        "separations_m"_a = std::map<std::string, double>(), "reference"_a = py::none(),
-        "reference_radius_m"_a = py::none(), "radius_m"_a = py::none(), "pose_t0"_a = py::none(),
-        "pose_t1"_a = py::none(),
+        "separations_m"_a = std::map<std::string, double>(), "reference"_a = py::none(), "radius_m"_a = py::none(),
+        "pose_t0"_a = py::none(), "pose_t1"_a = py::none(),
         "__init__(self, t0=None, t1=None, triangles=None, *, edges=None, mesh=None, name='', rigid=False, "
         "static=False, self_collision=True, against_bodies=True, against_obstacle=True, shell=False, "
-        "minimum_separation_m=0.0, vertex_mask=None, separations_m={}, reference=None, "
-        "reference_radius_m=None, radius_m=None, "
+        "minimum_separation_m=0.0, vertex_mask=None, separations_m={}, reference=None, radius_m=None, "
         "pose_t0=None, pose_t1=None)\n--\n\nSee help(dccd.Body).");
   c.def("move_to", &moveTo, "positions"_a,
         "move_to(self, positions)\n--\n\nThe next step: t0 is what t1 was, and t1 is these positions, (n, 3) float64 "

@@ -5,6 +5,7 @@ PYBIND11_MODULE(_dccd, m) {
   namespace py = pybind11;
   py::options options;
   options.disable_function_signatures();  // each docstring begins with one that inspect and help() can read
+  py::dtype::of<double>();  // pybind11 looks for numpy behind a static's guard: now, while no other thread can come in
   m.doc() = "The compiled part of dccd.";
   m.attr("__version__") = DCCD_VERSION;
   py::list kinds;

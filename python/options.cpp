@@ -205,6 +205,9 @@ bool setOption(const std::string& name, py::handle value, const Bodies& bodies, 
 }
 
 void refuseOption(const std::string& name) {
+  if (py::hasattr(py::type::of<NamedBody>(), name.c_str())) {
+    throw py::type_error("'" + name + "' is no option of a call but of a body: dccd.Body(..., " + name + "=...)");
+  }
   std::string known;
   for (const Row& row : rows()) known += (known.empty() ? "" : ", ") + std::string(row.name);
   throw py::type_error("there is no option '" + name + "'; there are " + known);

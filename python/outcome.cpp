@@ -36,27 +36,27 @@ const char* nameOf(const char* member) {
 
 #define DCCD_ARRAY_FIELD(member, published) {nameOf(#member), typeOf(Row().member), offsetof(Row, member)},
 
-// The types are never freed: at exit that would come after the interpreter's end.
 const py::dtype& contactType() {
   static_assert(sizeof(Certainty) == 1 && sizeof(PairKind) == 1);
   using Row = Contact;
-  static const auto* const TYPE = new py::dtype(structured({DCCD_CONTACT_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)));
-  return *TYPE;
+  static const py::dtype* type = nullptr;
+  return onceMade(type, [] { return structured({DCCD_CONTACT_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)); });
 }
 
 const py::dtype& intersectionType() {
-  static const auto* const TYPE = new py::dtype(structured({{"bodies", "(2,)u2", offsetof(StartIntersection, body)},
-                                                            {"vertices", "(5,)u4", offsetof(StartIntersection, vertex)},
-                                                            {"expected", "?", offsetof(StartIntersection, expected)}},
-                                                           sizeof(StartIntersection)));
-  return *TYPE;
+  static const py::dtype* type = nullptr;
+  return onceMade(type, [] {
+    return structured({{"bodies", "(2,)u2", offsetof(StartIntersection, body)},
+                       {"vertices", "(5,)u4", offsetof(StartIntersection, vertex)},
+                       {"expected", "?", offsetof(StartIntersection, expected)}},
+                      sizeof(StartIntersection));
+  });
 }
 
 const py::dtype& patchType() {
   using Row = Patch;
-  static const auto* const TYPE =
-      new py::dtype(structured({DCCD_PUBLISHED_PATCH_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)));
-  return *TYPE;
+  static const py::dtype* type = nullptr;
+  return onceMade(type, [] { return structured({DCCD_PUBLISHED_PATCH_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)); });
 }
 
 const py::dtype& clearanceType() {
@@ -71,23 +71,26 @@ const py::dtype& clearanceType() {
       {prefix "voxel", "(3,)u2", offsetof(Clearance, distance) + offsetof(ClearanceDistance, voxel)}, {    \
     prefix "voxel_size", "u4", offsetof(Clearance, distance) + offsetof(ClearanceDistance, voxel_size)     \
   }
-  static const auto* const TYPE = new py::dtype(structured({{"bodies", "(2,)u2", offsetof(Clearance, body)},
-                                                            {"expected", "?", offsetof(Clearance, expected)},
-                                                            DCCD_DISTANCE("end_", at_end),
-                                                            DCCD_DISTANCE("step_", over_step)},
-                                                           sizeof(Clearance)));
+  static const py::dtype* type = nullptr;
+  return onceMade(type, [] {
+    return structured({{"bodies", "(2,)u2", offsetof(Clearance, body)},
+                       {"expected", "?", offsetof(Clearance, expected)},
+                       DCCD_DISTANCE("end_", at_end),
+                       DCCD_DISTANCE("step_", over_step)},
+                      sizeof(Clearance));
+  });
 #undef DCCD_DISTANCE
-  return *TYPE;
 }
 
 const py::dtype& geometryType() {
-  static const auto* const TYPE =
-      new py::dtype(structured({{"point", "(3,)f8", offsetof(ContactGeometry, point)},
-                                {"normal", "(3,)f8", offsetof(ContactGeometry, normal)},
-                                {"weights", "(4,)f8", offsetof(ContactGeometry, weights)},
-                                {"approach_speed", "f8", offsetof(ContactGeometry, approach_speed)}},
-                               sizeof(ContactGeometry)));
-  return *TYPE;
+  static const py::dtype* type = nullptr;
+  return onceMade(type, [] {
+    return structured({{"point", "(3,)f8", offsetof(ContactGeometry, point)},
+                       {"normal", "(3,)f8", offsetof(ContactGeometry, normal)},
+                       {"weights", "(4,)f8", offsetof(ContactGeometry, weights)},
+                       {"approach_speed", "f8", offsetof(ContactGeometry, approach_speed)}},
+                      sizeof(ContactGeometry));
+  });
 }
 
 /// Zeros for what lies between the fields of its rows: equal answers have equal bytes, in a file as well.
@@ -96,7 +99,8 @@ void clearGaps(const py::dtype& type, std::vector<T>& rows) {
   struct Gap {
     std::size_t begin, bytes;
   };
-  static const std::vector<Gap> GAPS = [&type] {
+  static const std::vector<Gap>* made = nullptr;
+  const std::vector<Gap>& gaps_of_row = onceMade(made, [&type] {
     std::vector<Gap> gaps;
     std::size_t end = 0;
     const auto gapTo = [&](std::size_t begin) {
@@ -109,9 +113,9 @@ void clearGaps(const py::dtype& type, std::vector<T>& rows) {
     }
     gapTo(sizeof(T));
     return gaps;
-  }();
+  });
   for (T& row : rows) {
-    for (const Gap& gap : GAPS) std::memset(reinterpret_cast<char*>(&row) + gap.begin, 0, gap.bytes);
+    for (const Gap& gap : gaps_of_row) std::memset(reinterpret_cast<char*>(&row) + gap.begin, 0, gap.bytes);
   }
 }
 

@@ -91,13 +91,19 @@ std::vector<VertexMotion> motionsOf(const Doubles& t0, const Doubles& t1) {
   return vertices;
 }
 
+const py::dtype& pairType() {
+  static const py::dtype* type = nullptr;
+  return onceMade(type, [] {
+    return structured({{"contact", "?", offsetof(PairRow, contact)},
+                       {"undecided", "?", offsetof(PairRow, undecided)},
+                       {"toc_lower", "f8", offsetof(PairRow, toc_lower)},
+                       {"toc_upper", "f8", offsetof(PairRow, toc_upper)}},
+                      sizeof(PairRow));
+  });
+}
+
 py::array rowsOf(const std::vector<ElementaryResult>& results) {
-  static const auto* const TYPE = new py::dtype(structured({{"contact", "?", offsetof(PairRow, contact)},
-                                                            {"undecided", "?", offsetof(PairRow, undecided)},
-                                                            {"toc_lower", "f8", offsetof(PairRow, toc_lower)},
-                                                            {"toc_upper", "f8", offsetof(PairRow, toc_upper)}},
-                                                           sizeof(PairRow)));
-  py::array rows(*TYPE, static_cast<py::ssize_t>(results.size()));
+  py::array rows(pairType(), static_cast<py::ssize_t>(results.size()));
   auto* row = static_cast<PairRow*>(rows.mutable_data());
   for (const ElementaryResult& r : results) {
     *row = {r.toc_lower, r.toc_upper, r.verdict == Verdict::CONTACT, r.verdict == Verdict::UNDECIDED, {}};

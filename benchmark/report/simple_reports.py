@@ -120,6 +120,23 @@ def write_sheets(folder, sheets):
                 "takes; at most 4 is asked.\n\n" % (max(costs)[1], max(costs)[0] / min(costs)[0], min(costs)[1]) + table(header, lines))
 
 
+def write_cliffs(folder, result):
+    """Steps against their neighbours: the first of each row is the one in question."""
+    def lines_of(rows):
+        for row in rows:
+            first = row["steps"][0]
+            for step in row["steps"][1:]:
+                yield [row["name"], first["name"], "%.1f" % first["ms"], str(first["contacts"] + first["crossings"]), step["name"], "%.1f" % step["ms"],
+                       str(step["contacts"] + step["crossings"]), "%.1f" % step["ratio"], "%g" % row["at_most"]]
+    header = ["step", "as", "ms", "found", "beside", "ms", "found", "ratio", "asked"]
+    lines = list(lines_of(result["rows"]))
+    write_rows(os.path.join(folder, "neighbours.csv"), header, lines)
+    found = list(lines_of(result["found"]))
+    return save(folder, "neighbours", "# Steps against their neighbours\n\nProcessor time, bests in turns. The ratio is of the times a face, or, where "
+                "all find something, a face and what is found.\n\n" + table(header, lines) + "\n\nOf %d random scenes %d are dearer than asked.\n\n"
+                % (result["scenes"], len(result["found"])) + (table(header, found) if found else ""))
+
+
 def of_turns(ones, others):
     """Of runs in turns: median times of both, the median of the ratios of neighbours, and what these span."""
     ratios = sorted(one / other for one, other in zip(ones, others))

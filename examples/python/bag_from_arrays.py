@@ -3,8 +3,8 @@
 
 usage: bag_from_arrays.py FRAMES OUT.bag [--topology MESH] [--rate HZ] [--topic NAME] [--frame NAME] [--scale FACTOR]
 
-FRAMES: an .npy of frames x vertices x 3; an .npz that holds such an array, and perhaps `faces` (or `triangles`) of m x 3 and
-`times` [s]; or a folder of meshes in whatever format meshio reads, in the order of their names, 2.obj before 10.obj. Vertices
+FRAMES: an .npy of frames x vertices x 3; an .npz that holds such an array, and perhaps `faces` (or `triangles`) of m x 3 or
+`edges` (or `lines`) of m x 2, and `times` (or `time`) [s]; or a folder of meshes in whatever format meshio reads, in the order of their names, 2.obj before 10.obj. Vertices
 that were lost are NaN.
 MESH: a file whose triangles, or whose lines, join the vertices; the numbers are those of the frames. An array without faces is
 recorded as points, for topology/rows and cols, or topology/source: polyline, in the file that --params takes.
@@ -31,8 +31,16 @@ def in_order(path):
     return [int(part) if part.isdigit() else part for part in re.split(r'([0-9]+)', path.name)]
 
 
+def lines_of_obj(path):
+    """The segments of its `l`, which meshio passes over without a word."""
+    ends = [[int(word.split('/')[0]) - 1 for word in line.split()[1:]] for line in open(path) if re.match(r'\s*l\s', line)]
+    return np.array([pair for line in ends for pair in zip(line, line[1:])], int).reshape(-1, 2)
+
+
 def cells_of(mesh, path):
     """Its triangles and its lines, of which it has one kind; polygons of more corners are the reader's to cut."""
+    if pathlib.Path(path).suffix.lower() == '.obj' and len(lines := lines_of_obj(path)):
+        mesh.cells.append(meshio.CellBlock('line', lines))
     kinds = {block.type for block in mesh.cells if len(block.data) > 0}
     if kinds - {'triangle', 'line', 'vertex'} or {'triangle', 'line'} <= kinds:
         sys.exit('%s: has %s; triangles, or lines, can be recorded' % (path, ' and '.join(sorted(kinds))))
@@ -57,13 +65,14 @@ def from_folder(folder):
 
 
 def from_archive(path):
-    """Frames, faces and times of an .npz; the latter two may be missing."""
+    """Frames, triangles and lines, and times of an .npz; the latter may be missing. Edges beside faces are the faces' own."""
     arrays = np.load(path)
     frames = [name for name in arrays.files if arrays[name].ndim == 3 and arrays[name].shape[2] == 3]
     if len(frames) != 1:
         sys.exit('%s: has %s of frames x vertices x 3; one is needed' % (path, ' and '.join(frames) or 'no array'))
-    faces = next((arrays[name] for name in ('faces', 'triangles') if name in arrays.files), None)
-    return arrays[frames[0]], faces, arrays['times'] if 'times' in arrays.files else None
+    one_of = lambda names, otherwise: next((arrays[name] for name in names if name in arrays.files), otherwise)
+    faces, edges = one_of(('faces', 'triangles'), np.empty((0, 3), int)), one_of(('edges', 'lines'), np.empty((0, 2), int))
+    return arrays[frames[0]], (faces, edges[:0] if len(faces) else edges), one_of(('times', 'time'), None)
 
 
 def read(arguments):
@@ -72,14 +81,15 @@ def read(arguments):
     if path.is_dir():
         frames, cells = from_folder(path)
     elif path.suffix == '.npz':
-        frames, faces, times = from_archive(path)
-        cells = None if faces is None else (faces, np.empty((0, 2), int))
+        frames, cells, times = from_archive(path)
     else:
         frames = np.load(path)
     if frames.ndim != 3 or frames.shape[2] != 3 or frames.shape[1] == 0:
         sys.exit('%s: is an array of %s; frames x vertices x 3 is needed' % (path, ' x '.join(map(str, frames.shape))))
     if arguments.topology:
         cells = cells_of(meshio.read(arguments.topology), arguments.topology)
+        if not any(map(len, cells)):
+            sys.exit('%s: has neither triangles nor lines' % arguments.topology)
     triangles, lines = cells or (np.empty((0, 3), int), np.empty((0, 2), int))
     for corners in (triangles, lines):
         if corners.size and not 0 <= corners.min() <= corners.max() < frames.shape[1]:

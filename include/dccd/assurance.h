@@ -23,9 +23,9 @@ struct Assurance {
   bool clear() const { return proved && touching == Touching::NONE; }
 };
 
-/// The one place where a proof is judged: what the step itself had to show (Outcome::unproved, filled where the step is
-/// concluded), that it has an answer at all, and what else stands in the way now (`faults`: a frame without an answer,
-/// a publisher that fell silent, a reset ...; a sentence each).
+/// The one place where a proof is judged: what the step itself had to show (Outcome::claim), that it has an answer at
+/// all, and what else stands in the way now (`faults`: a frame without an answer, a publisher that fell silent, a reset
+/// ...; a sentence each).
 DCCD_EXPORT Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults = {});
 
 /// One line for people: "proved, nothing touches", "proved, what touches lasts", "not proved: ...; ...".

@@ -20,13 +20,6 @@ enum class BodyMotionKind : std::uint8_t {
   STATIC = 1,  ///< the newest frame holds at all times
 };
 
-/// Where a body was when it was known to be fit: its features that are closer there than the minimum separation are
-/// neighbours, not layers.
-struct ReferenceFrame {
-  Positions positions;           ///< [m]
-  std::vector<double> radius_m;  ///< the largest uncertainty per vertex that the list is to be made for; empty: none
-};
-
 /// A minimum separation [m] from one other body (or itself, or OBSTACLE_BODY) instead of the larger of the two bodies'.
 struct SeparationFrom {
   std::uint16_t body = 0;
@@ -59,6 +52,7 @@ struct Body {
   /// In a stream: how far from its surface the sensor that made the map may have put its points; what the map first
   /// shows there is the body's own, and no obstacle [m]. 0: nothing is. ONE_VOXEL: as far as a voxel is long.
   double own_voxels_m = 0;
+  std::string link;  ///< of a robot; empty: none. What one link accounts for in a map another one may go on to
   double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
   std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
   std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
@@ -66,7 +60,9 @@ struct Body {
 
   // Its mesh.
   std::shared_ptr<const Topology> topology;
-  std::shared_ptr<const ReferenceFrame> reference;  ///< null: no pair is left out of the separation
+  /// Where it was when it was known to be fit [m]: its features that are closer there than the minimum separation are
+  /// neighbours, not layers. null: no pair is left out of the separation.
+  std::shared_ptr<const Positions> reference;
 
   std::uint64_t dropped_faces = 0;  ///< that were sent and could not be used: unchecked
 

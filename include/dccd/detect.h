@@ -68,9 +68,6 @@ class DCCD_EXPORT History {
   void clear();
   /// Nothing is known of a last step: what clear() leaves, and what a new history has.
   bool isClear() const;
-  /// Pairs from which the minimum separation is left out; in the order of the bodies, kinds, features. Changes with the
-  /// reference frames only.
-  const std::vector<LeftOutPair>& leftOut() const;
 
   struct DCCD_HIDDEN Impl;
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -86,6 +87,9 @@ class DCCD_EXPORT PromiseWatch {
   void setBounds(std::vector<SpeedBound> bounds) { bounds_ = std::move(bounds); }
   /// The next promise, after a look at the last one. Of an outcome without an answer none, and the last one stands.
   const SafeUntil& follow(const Outcome& outcome);
+  /// What follow() made of this outcome is this later promise, which rests on something more: `why_void` says of the
+  /// next answer, if that comes before the promise ends, why that was not so; empty: it was.
+  void extend(const Outcome& outcome, const SafeUntil& later, std::function<std::string(const Outcome&)> why_void);
   /// What the promise rests on has changed, as which contacts are expected, or which bodies there are: it is void from
   /// now on, and the next answer says so. `why`: a sentence. Without a promise that stands nothing happens.
   void revoke(const std::string& why);
@@ -109,6 +113,8 @@ class DCCD_EXPORT PromiseWatch {
   std::shared_ptr<const Step> step_;
   std::shared_ptr<const VoxelSurface> obstacle_;
   std::vector<SpeedBound> assumed_;
+  std::function<std::string(const Outcome&)> why_void_;
+  void keep(const Outcome& outcome);
 };
 
 /// The three numbers of the law, in the terms of ISO/TS 15066, 5.5.4.

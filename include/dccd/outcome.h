@@ -105,8 +105,8 @@ struct StepStats {
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
   std::uint64_t bodies_far = 0;        ///< near nothing that they are tested against; no bounds are computed
   std::uint64_t map_answers_kept = 0;  ///< bodies at rest whose contacts with the map are those of the step before
-  std::uint64_t left_out_listed = 0;   ///< pairs closer than the separation in the reference frame
-  std::uint64_t left_out_met = 0;      ///< of those, the ones that came to the elementary test, without a separation
+  /// Pairs closer in the reference frame than what they would carry that came to the elementary test without it.
+  std::uint64_t left_out_met = 0;
   const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
   StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
   const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
@@ -131,7 +131,6 @@ struct StepStats {
   COUNTER(body_pairs, false)        \
   COUNTER(bodies_far, false)        \
   COUNTER(map_answers_kept, false)  \
-  COUNTER(left_out_listed, true)    \
   COUNTER(left_out_met, false)
 
 struct StepCounter {
@@ -169,15 +168,6 @@ struct StartIntersection {
   bool expected = false;  ///< as of a contact
 };
 
-/// A pair of features of one body from which the separation is left out, because it is closer in the reference frame
-/// (with uncertainty radii: while it is closer there than its present separation). It is still tested for contact
-/// without one.
-struct LeftOutPair {
-  PairKind kind = PairKind::VERTEX_FACE;
-  std::uint16_t body = 0;
-  std::array<Index, 4> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< as in Contact
-};
-
 /// What nobody looked at in a part of a step.
 struct Gap {
   std::array<std::uint16_t, 2> body{0, 0};  ///< which partners may touch; OBSTACLE_BODY: the map
@@ -185,17 +175,72 @@ struct Gap {
   double from = 0, to = 1;                  ///< [1] of the step
 };
 
-/// Whether all that is asked of a step was looked at. Nothing is, until it is said of each part.
+/// What has to be answered of a step, and of whom. detect() answers those of each step; those of a cell are answered by
+/// who makes frames and maps of what comes, and asked where MonitorOptions::in_cell says so. The words complete "nobody
+/// looked ...".
+#define DCCD_QUESTIONS(ROW)                                                                     \
+  ROW(USABLE, BODY, STEP, "whether anything of % can be checked")                               \
+  ROW(NEIGHBOURS, BODY, STEP, "whether neighbours on % that may touch do")                      \
+  ROW(MAP_IS_THERE, WHOLE, STEP, "whether there is a map")                                      \
+  ROW(MAP_IS_NO_BODY, WHOLE, STEP, "whether voxels near bodies are obstacles")                  \
+  ROW(CONTENTS, WHOLE, STEP, "whether all of the bodies can be checked")                        \
+  ROW(WAYS, WHOLE, STEP, "whether all went as the step says")                                   \
+  ROW(PARTS, WHOLE, STEP, "whether the step's parts are short enough")                          \
+  ROW(TIME, WHOLE, STEP, "whether there was time for all")                                      \
+  ROW(START, WHOLE, STEP, "whether surfaces cross when the step begins")                        \
+  ROW(SENDER, BODY, CELL, "who sends %")                                                        \
+  ROW(CLOCK, BODY, CELL, "by whose clock % is stamped")                                         \
+  ROW(NUMBERING, BODY, CELL, "whether vertices of % still have the numbers that name them")     \
+  ROW(MAP_CLOCK, WHOLE, CELL, "by whose clock the map is stamped")                              \
+  ROW(MAP_PLACE, WHOLE, CELL, "where the map was at its stamp")                                 \
+  ROW(NEWEST_MAP, WHOLE, CELL, "whether a newer map came")                                      \
+  ROW(TRANSFORMS, WHOLE, CELL, "whether all of tf came")                                        \
+  ROW(TRANSFORM_CLOCKS, WHOLE, CELL, "by whose clocks tf is stamped")                           \
+  ROW(NEWEST_FRAME, WHOLE, CELL, "whether frames still come")                                   \
+  ROW(CALLS, WHOLE, CELL, "whether it began after the last call that changed what it rests on") \
+  ROW(FIXED_FRAME, WHOLE, CELL, "whether the fixed frame is at rest")                           \
+  ROW(ROBOT, WHOLE, CELL, "whether all of the robot is watched")
+#define DCCD_QUESTION_ENUMERATOR(QUESTION, OF, BY, words) QUESTION,
+enum class Question : std::uint8_t { DCCD_QUESTIONS(DCCD_QUESTION_ENUMERATOR) COUNT };
+#undef DCCD_QUESTION_ENUMERATOR
+
+/// Why a step is proved: each question was asked of each body, and somebody answered it. Nothing is by default. Of
+/// pairs of partners the answers are gaps (src/proof/looked.h).
 class Claim {
  public:
+  /// The step has so many bodies. Before, the claim does not hold.
+  DCCD_EXPORT void ask(std::size_t bodies);
+  /// Those of a cell, too.
+  void askOfCell() { of_cell_ = true; }
+  /// why_not: a sentence; empty: it is as it should be. `body` of a question that is not of a body is left out. One
+  /// that is answered again needs all of its answers.
+  DCCD_EXPORT void answer(Question question, const std::string& why_not, std::size_t body = 0);
+  DCCD_EXPORT void answer(Question question, const std::vector<std::string>& why_not);
   /// Parts follow each other. Of more gaps than a few the first are kept.
   DCCD_EXPORT void add(std::size_t part, std::size_t parts, const std::vector<Gap>& gaps);
-  bool holds() const { return parts_ > 0 && covered_ == parts_ && gaps_.empty(); }
+  /// Of a recording, which has in words what was said of its claim.
+  DCCD_EXPORT static Claim thatWasSaid(const std::vector<std::string>& missing);
+
+  /// All of it was looked at: no part is missing, and none has a gap.
+  bool isCovered() const { return parts_ > 0 && covered_ == parts_ && gaps_.empty(); }
+  DCCD_EXPORT bool holds() const;
+  /// It holds, but that something was not looked at for want of time.
+  DCCD_EXPORT bool holdsButForTime() const;
   const std::vector<Gap>& gaps() const { return gaps_; }
-  /// Why it does not hold, a sentence each; a body's name by its number.
-  DCCD_EXPORT std::vector<std::string> inWords(const std::vector<std::string>& names) const;
+  /// Why it does not hold, a sentence each; empty exactly when it does. `bodies`: for their names.
+  DCCD_EXPORT std::vector<std::string> missing(const std::vector<Body>& bodies) const;
 
  private:
+  struct Denied {
+    Question question;
+    std::string why;
+  };
+  std::uint32_t asked(bool of_body) const;
+  bool isAnswered() const;
+
+  std::vector<std::uint32_t> answered_;  // by body, and last of the step as a whole: a bit a question
+  std::vector<Denied> denied_;           // in the order in which they were answered
+  bool of_cell_ = false;
   std::size_t covered_ = 0, parts_ = 0;
   std::vector<Gap> gaps_;
 };
@@ -248,15 +293,15 @@ struct Outcome : Findings {
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
   std::size_t substeps = 0;                                                  ///< parts that the step was cut into
   Touching touching = Touching::NONE;  ///< as if no patches were tracked; Assurance::touching holds
-  Claim claim;                         ///< that all of the step was looked at: else nothing is proved
-  // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
-  std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not
-  std::vector<std::string> excluded;  ///< what was left out by choice
-  std::vector<std::string> expected;  ///< which contacts are expected, whether or not there are any
+  Claim claim;                         ///< what assuranceOf() judges by (dccd/assurance.h)
+  std::vector<std::string> excluded;   ///< what was left out by choice, a sentence each
+  std::vector<std::string> expected;   ///< which contacts are expected, whether or not there are any, a sentence each
 
   std::shared_ptr<const Step> step;              ///< what it answers; null where nothing was answered
   std::shared_ptr<const VoxelSurface> obstacle;  ///< of the step's map, what exclude_boxes left; null: none
 
+  /// Why it is not proved, a sentence each.
+  std::vector<std::string> missing() const { return step ? claim.missing(step->bodies) : claim.missing({}); }
   /// No pair was left out of the contacts, whatever is known of the start state.
   bool allPairs() const { return !(unchecked_toc_lower <= 1); }
   double duration_s() const { return secondsBetween(start_ns, stamp_ns); }

@@ -18,7 +18,7 @@ namespace dccd {
 struct OwnVoxel {
   VoxelKey key;
   std::uint16_t body = 0;
-  bool doubted = false;  ///< it was there in the first map: body or obstacle, nobody can tell
+  bool doubted = false;  ///< body or obstacle, no look has told
 };
 
 /// What was taken out of a map since it is a body's own (doc/algorithm.md, "Own voxels").

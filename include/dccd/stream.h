@@ -31,10 +31,16 @@ struct MonitorOptions {
   /// How much older than its stamp what a map shows may be, for the bodies' own voxels [s].
   double own_voxels_lag_s = 0.1;
   bool own_voxels_trust = false;  ///< what the first map shows where a body is, is its own
-  double look_ahead_s = 0;        ///< horizon of predictions, at most 1e8; 0: none
+  /// A map's own voxels are told on a thread of their own, by the frames of when that began, and until it is done steps
+  /// have the map before. Else in the step that takes the map, and which map a step has follows from the stamps alone.
+  bool own_voxels_beside = false;
+  double look_ahead_s = 0;  ///< horizon of predictions, at most 1e8; 0: none
   /// A patch that comes back within this is the same one; of steps that were answered whole. With
   /// detector.patches.
   double patch_gap_s = tolerance::PATCH_GAP_S;
+  /// What is pushed is made of what came. Who makes it has questions to answer of each outcome of next() and
+  /// checkNow(), too (Claim::askOfCell): until then nothing is proved.
+  bool in_cell = false;
 
   MonitorOptions() { detector.max_contacts = 10000; }
 };
@@ -136,9 +142,6 @@ class DCCD_EXPORT Monitor {
   /// From the newest frames to their extrapolation over look_ahead_s; toc is a fraction of that horizon. NO_BODY when
   /// a body has no two frames without a seam between them. Valid after an outcome with a result.
   Outcome predict();
-
-  /// Pairs from which the minimum separation is left out (see LeftOutPair); changes with the reference frames only.
-  const std::vector<LeftOutPair>& leftOut() const;
 
   const FrameCounters& counters(std::size_t body) const;
   FrameCounters total() const;

@@ -119,6 +119,10 @@ DCCD_MARGIN double BATCH_MINOR = 8.0625;                ///< [1] of a minor, tim
 DCCD_MARGIN double BATCH_SEPARATION = 22.5 * HALF_ULP;  ///< [1] of a minor's coefficient over [a, b], times X Y
 constexpr double BATCH_TIME = 2.5 * HALF_ULP;           ///< [step] slack of h, half a bracket's width
 DCCD_MARGIN double SIMPLE_TIME = 155 * HALF_ULP;        ///< [1] of f's coefficients up to a rounded time, times U V W
+/// [1] Slack of f's coefficients from pairs of doubles, times U V W: 234 of these 4096 squares of half ulps are proved.
+constexpr double BATCH_SHARP_VALUE = 0x1p-94;
+/// [1] Slack of what is computed in doubles of such coefficients, times the largest: 9 half ulps are proved.
+constexpr double BATCH_SHARP = 0x1p-48;
 constexpr double BATCH_SMALLEST_M = 0x1p-150, BATCH_LARGEST_M = 0x1p150;  ///< [m] guard on U, V, W
 /// [step] Subdivision ends here and leaves the pair to the next tier. Smaller: fewer pairs there, more steps here.
 constexpr double BATCH_SMALLEST_INTERVAL = 0x1p-12;
@@ -256,6 +260,20 @@ constexpr int MOST_OWN_PLACES = 64;
 constexpr std::size_t MOST_OWN_ASKED = std::size_t{1} << 21;
 /// [s] How far back a body's way is known at the most, where maps come seldom.
 constexpr double OWN_PATH_S = 10;
+/// [s] Time between two looks at a map after which a body must have been within reach all along for what appeared to be
+/// its own. Larger: an obstacle that came near while nobody looked is more easily taken for a body. Smaller: more is in
+/// doubt where maps come seldom.
+constexpr double OWN_GAP_S = 0.5;
+/// [s] For so long what appeared out of reach, or in doubt, makes what appears beside it in reach doubtful: one voxel
+/// of 2 cm takes a hand of 0.1 m/s 0.2 s, and one of 10 cm a second. Larger: what a body's noise left beside it costs
+/// more proofs. Smaller: a slower hand may grow into a body's own.
+constexpr double OWN_GROWTH_S = 1;
+/// [1] of a voxel: how far the map's frame may move before its voxels are other ones. Larger: a body's way is placed
+/// the less exactly among them. Smaller: a frame that trembles ends all that is own.
+constexpr double OWN_FRAME = 0x1p-6;
+/// [1] Cubes that were never seen free without a body, and are free: so many are looked at anew with each map, in turn.
+/// Larger: more time where a body rests in sight from the first map on. Smaller: what it leaves is in doubt for longer.
+constexpr std::size_t OWN_UNKNOWN_ASKED = 1024;
 
 }  // namespace tolerance
 }  // namespace dccd

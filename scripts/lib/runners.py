@@ -251,14 +251,19 @@ class FuzzRunner:
         # A short try of a few seconds is one round, and says so.
         one_round = self.ROUND_S < 600 or self.binary.name in self.CORE
         least = 0 if one_round else self.DECODER_RUNS
-        dictionary = CHECKOUT / 'test/fuzz/dictionaries' / (target + '.dict')
-        options = ['-dict=%s' % dictionary] if dictionary.exists() else []
+        corpus, marks = CHECKOUT / 'test/fuzz/corpus' / target, CHECKOUT / 'test/fuzz/dictionaries' / (target + '.dict')
+        options = []
+        if marks.exists():
+            keys = set(re.findall(r'\w+(?=:)', ''.join(seed.read_text() for seed in corpus.iterdir())))
+            dictionary = work.parent / marks.name
+            dictionary.write_text(marks.read_text() + ''.join('"%s: "\n' % key for key in sorted(keys)))
+            options = ['-dict=%s' % dictionary]
         runs = most = coverage = 0
         saturated = False
         for _ in range(1 if one_round else self.MAX_ROUNDS):
             status = run([str(self.binary), *options, '-max_total_time=%d' % self.ROUND_S, '-rss_limit_mb=4096',
                           '-timeout=30', '-print_final_stats=1', '-artifact_prefix=%s/' % findings, str(work),
-                          str(CHECKOUT / 'test/fuzz/corpus' / target)], log, self.ENVIRONMENT)
+                          str(corpus)], log, self.ENVIRONMENT)
             output = log.read_text(errors='replace')
             done = re.search(r'number_of_executed_units: (\d+)', output)
             covered = re.findall(r' cov: (\d+)', output)

@@ -131,7 +131,6 @@ std::string mapUsed(const BagReplaySummary& summary) {
 /// What the page's head says of the run.
 void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary, Report& report) {
   report.setEffects(summary.effects.decisions());
-  report.setLeftOut(summary.left_out, config.monitorBodies());
   report.setPromises(promisesInWords(summary));
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
   report.setCounters(summary.frames);
@@ -156,6 +155,7 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
   for (const std::string& sentence : summary.not_looked_at) facts.push_back({"not looked at", sentence});
   for (const std::string& c : summary.problems) facts.push_back({"complaint", c});
   report.setNotLookedAt(summary.not_looked_at);
+  report.setDoubts(summary.doubts);
   report.setUnansweredEnd(summary.unanswered_end);
   report.setFacts(std::move(facts));
 }
@@ -172,8 +172,10 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
             << "octomap: " << mapUsed(summary) << '\n'
             << "report: " << a.report << "/report.html\n";
   for (const std::string& sentence : summary.not_looked_at) std::cout << "note: " << sentence << '\n';
+  for (const std::string& sentence : summary.doubts) std::cout << "in doubt: " << sentence << '\n';
   const std::string unproved = report.unproved();
-  const std::string said = std::accumulate(summary.not_looked_at.begin(), summary.not_looked_at.end(), unproved);
+  std::string said = std::accumulate(summary.not_looked_at.begin(), summary.not_looked_at.end(), unproved);
+  said = std::accumulate(summary.doubts.begin(), summary.doubts.end(), said);
   for (const std::string& c : summary.problems) {
     const std::string refused = "refused: ";
     const std::size_t at = c.find(refused);

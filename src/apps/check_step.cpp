@@ -291,6 +291,29 @@ std::vector<MeshFile> framesOfArrays(const Arguments& a) {
   return frames;
 }
 
+/// The edges of ropes. Two ends that are at one place in every frame are one vertex, the first of them: else the edges
+/// on either side of a point that repeats would touch there.
+std::vector<Edge> edgesOf(const std::vector<MeshFile>& frames) {
+  std::vector<Index> first(frames[0].positions.size());
+  std::iota(first.begin(), first.end(), Index(0));
+  const auto firstOf = [&](Index v) {
+    while (first[v] != v) v = first[v];
+    return v;
+  };
+  for (const Edge& edge : frames[0].edges) {
+    const auto isOne = [&](const MeshFile& frame) { return frame.positions[edge[0]] == frame.positions[edge[1]]; };
+    if (!std::all_of(frames.begin(), frames.end(), isOne)) continue;
+    const auto [low, high] = std::minmax({firstOf(edge[0]), firstOf(edge[1])});
+    first[high] = low;
+  }
+  std::vector<Edge> edges;
+  for (const Edge& edge : frames[0].edges) {
+    const Index a = firstOf(edge[0]), b = firstOf(edge[1]);
+    if (a != b) edges.push_back({a, b});
+  }
+  return edges;
+}
+
 std::vector<Step> stepsOf(const Arguments& a) {
   const bool has_arrays = !a.topology.empty() || std::any_of(a.frames.begin(), a.frames.end(), isArray);
   const std::vector<MeshFile> frames = has_arrays ? framesOfArrays(a) : framesOf(a.frames);
@@ -300,7 +323,7 @@ std::vector<Step> stepsOf(const Arguments& a) {
   step.bodies.resize(1);
   step.bodies[0].name = a.frames[0];
   step.bodies[0].topology = share(first.edges.empty() ? Topology::fromTriangles(first.positions.size(), first.faces)
-                                                      : Topology::fromEdges(first.positions.size(), first.edges));
+                                                      : Topology::fromEdges(first.positions.size(), edgesOf(frames)));
   step.bodies[0].dropped_faces = first.unchecked.size();
   step.bodies[0].t1 = share(first.positions);
   std::vector<Step> steps;

@@ -3,6 +3,8 @@
 #include <atomic>
 #include <csignal>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
@@ -15,9 +17,21 @@ namespace {
 std::atomic<bool> ended{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
+/// Where neither a launch file nor the command line has set it, an earlier start has.
+std::string whoElseSetIt(const std::vector<std::string>& arguments, const std::string& error) {
+  for (const std::string& argument : arguments) {
+    const std::size_t end = argument.find(":=");
+    if (argument.rfind("__log:=", 0) == 0) return "";  // of roslaunch
+    if (argument.rfind("_", 0) != 0 || end == std::string::npos) continue;
+    if (error.find("~" + argument.substr(1, end - 1)) != std::string::npos) return "";
+  }
+  return " (an earlier start may have left it: rosparam delete " + ros::this_node::getName() + ")";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv + 1, argv + argc);  // roscpp takes its own out
   // roscpp's own handler would take the topics away before the monitor has said that it proves nothing any more.
   ros::init(argc, argv, "collision_monitor", ros::init_options::NoSigintHandler);
   for (const int signal : {SIGINT, SIGTERM}) {  // containers and service managers send SIGTERM
@@ -29,9 +43,7 @@ int main(int argc, char** argv) {
     const dccd::CollisionMonitor monitor{node, ros::NodeHandle("~"), dccd::CollisionMonitor::Process::OWN, goes_on};
     while (ros::ok() && !ended) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
   } catch (const dccd::ParameterError& error) {
-    ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what()
-                                                        << " (an earlier start may have left it: rosparam delete "
-                                                        << ros::this_node::getName() << ")");
+    ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what() << whoElseSetIt(arguments, error.what()));
     return 1;
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what());

@@ -72,7 +72,8 @@ class DCCD_EXPORT CloudMap {
   /// or a point outside of the 65536 voxels that a map spans; and where more than `max_bytes` would be needed: a part
   /// of the view may then be in the map.
   SeenCounts insert(const SensorView& view, std::size_t max_bytes);
-  /// As decodeOctomap() would find them in the map's message. Throws OctomapError for limits exceeded.
+  /// As decodeOctomap() would find them in the map's message; found: what the last view did. Throws OctomapError for
+  /// limits exceeded.
   DecodedOctomap leaves(const OctomapLimits& limits = {}) const;
   /// Voxels in Morton order in which a point lay that were not occupied with it, and which nothing has looked through
   /// since.

@@ -32,7 +32,6 @@ struct EffectScene {
   bool map_seen = false;                        ///< a file is named, somebody publishes the topic, or a map has come
   bool map_used = false;                        ///< the last step that was answered had a map
   bool predictions_heard = false;               ///< somebody subscribes to them
-  std::size_t left_out_pairs = 0;               ///< closer than the minimum separation in the reference frame
   double look_ahead_s = 0;
   bool clearance_wanted = false;      ///< by a parameter, or a subscriber to distances
   bool unknown_space_counts = false;  ///< unknown_space is not `free`

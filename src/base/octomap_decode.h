@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -34,6 +35,9 @@ struct DecodedOctomap {
   std::string id;
   std::vector<OccupiedLeaf> occupied;
   std::vector<OccupiedLeaf> free;
+  std::vector<float> log_odds;  ///< of what is occupied; empty: a binary stream, or they were not wanted
+  /// Of what is occupied: where the sensor found something since the map before; nothing: nobody tells.
+  std::optional<std::vector<OccupiedLeaf>> found;
 };
 
 /// What a stream holds: leaves, and the nodes of the trees that are built of the occupied ones and of all.
@@ -47,6 +51,7 @@ struct OctomapLimits {
   std::size_t max_bytes = std::size_t{256} << 20;
   std::size_t max_leaves = 20'000'000;  ///< occupied and free together; 12 bytes each
   bool free_leaves = true;              ///< false: they are counted and left out
+  bool log_odds = false;                ///< they are wanted, 4 bytes each, and what was found
   /// Asked last, with what was counted; what it throws ends the decoding. Null: all is well.
   std::function<void(const OctomapCounts& counts)> accept = nullptr;
 };

@@ -17,8 +17,17 @@ double ownVoxelsOf(ParameterReader& reader, double fallback) {
 SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback) {
   SpeedBound speed = fallback;
   if (!section.has("max_speed_m_s")) return speed;
-  const double max_m_s = section.number("max_speed_m_s", 0, LARGE);
-  speed.max_m_s = max_m_s > 0 ? max_m_s : SpeedBound::NONE;
+  if (section.raw("max_speed_m_s").kind == ParameterTree::Kind::TEXT) {
+    section.choice("max_speed_m_s", "none", {"none"});
+    speed.max_m_s = SpeedBound::NONE;
+    return speed;
+  }
+  speed.max_m_s = section.number("max_speed_m_s", 0, LARGE);
+  if (speed.max_m_s == 0) {  // which could be either
+    section.fail("max_speed_m_s",
+                 "is 0; what stands still is motion: static, or rigid in the fixed frame, and needs no bound; where "
+                 "nothing is to be promised write none");
+  }
   return speed;
 }
 
@@ -258,6 +267,11 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
     config.bodies_listed = true;
     if (reader.has("topic")) {
       reader.fail("topic", "(mesh:= of the launch files) has no place beside bodies; set bodies/NAME/topic instead");
+    }
+    if (reader.has("topology")) {
+      reader.fail("topology",
+                  "(topology:=, rows:= and cols:= of the launch files) has no place beside bodies; set "
+                  "bodies/NAME/topology instead");
     }
     ParameterReader section = reader.section("bodies");
     for (const std::string& name : section.names()) {

@@ -62,7 +62,9 @@ std::string distanceAskedBy(const std::string& path, const MonitorConfig& config
   const auto distance = [](const std::string& name, const std::string& what) {
     return "parameter " + name + " asks for " + what + ": write accuracy: conservative, or set it to 0";
   };
-  const auto pads = [](const BodyConfig& body) { return !body.link.empty() && body.body.minimum_separation_m > 0; };
+  const auto pads = [](const BodyConfig& body) {
+    return !body.body.link.empty() && body.body.minimum_separation_m > 0;
+  };
   if (config.minimum_separation_m > 0) return distance(path + "minimum_separation_m", "a minimum separation");
   if (std::any_of(config.bodies.begin(), config.bodies.end(), pads)) {
     return distance(path + "robot/padding_m", "a minimum separation");

@@ -34,11 +34,9 @@ struct BodyConfig {
   std::string mesh_file;
   std::string tf_frame;
   double mesh_scale = 1;
-  SpeedBound speed;                  ///< after a step; of a static body 0
-  double max_acceleration_m_s2 = 0;  ///< between two frames no vertex has more; 0: nobody says
-  // A robot's link: its mesh is made already.
-  std::string link;
-  std::shared_ptr<const MeshResource> link_mesh;
+  SpeedBound speed;                               ///< after a step; of a static body 0
+  double max_acceleration_m_s2 = 0;               ///< between two frames no vertex has more; 0: nobody says
+  std::shared_ptr<const MeshResource> link_mesh;  ///< of a robot's link it is made already
   bool isRigid() const { return body.rigid; }
   bool isDepthImage() const { return input.source == TopologySource::DEPTH_IMAGE; }
   bool hasNoise() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
@@ -51,6 +49,12 @@ struct CloudSource {
   std::string topic;
   std::string camera_info;   ///< topic of a depth picture's CameraInfo; empty: camera_info beside the picture's
   std::string sensor_frame;  ///< where the sensor is whose clouds come in the map's own frame; empty: nobody says
+};
+
+/// The parameters under `intent`: of ~intended.
+struct IntentConfig {
+  double horizon_s = 0;  ///< how long a twist is held, and how far ahead a trajectory is looked at
+  double deviation_m = 0, deviation_rate_m_s = 0;
 };
 
 struct MarkerConfig {
@@ -84,11 +88,12 @@ struct MonitorConfig {
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
   MonitorOptions monitor;
   EffectSettings effects;
-  double minimum_separation_m = 0;    ///< of bodies that name none
-  double own_voxels_m = 0;            ///< the same
-  SpeedBound speed;                   ///< the same
-  double max_acceleration_m_s2 = 0;   ///< the same
-  std::optional<SpeedLaw> speed_law;  ///< of ~speed_scale; none: nobody asks for it
+  double minimum_separation_m = 0;     ///< of bodies that name none
+  double own_voxels_m = 0;             ///< the same
+  SpeedBound speed;                    ///< the same
+  double max_acceleration_m_s2 = 0;    ///< the same
+  std::optional<SpeedLaw> speed_law;   ///< of ~speed_scale; none: nobody asks for it
+  std::optional<IntentConfig> intent;  ///< of ~intended; none: nobody listens to it
   /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
   std::vector<Expectation> expected_contacts;
   std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from

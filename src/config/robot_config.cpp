@@ -113,7 +113,7 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
       if (other == p || mayMeet(part, robot.parts[other], asked.against_links, never)) continue;
       body.body.not_against.push_back(static_cast<std::uint16_t>(first + other));
     }
-    body.tf_frame = body.link = part.link;
+    body.tf_frame = body.body.link = part.link;
     body.speed = asked.speedOr(config.speed);
     body.link_mesh = part.mesh;
     config.bodies.push_back(std::move(body));
@@ -124,7 +124,7 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
 void readHolds(const ParameterReader& reader, const RobotConfig& asked, MonitorConfig& config) {
   std::vector<std::string> bodies;
   for (const BodyConfig& body : config.bodies) {
-    if (body.link.empty()) bodies.push_back(body.body.name);
+    if (body.body.link.empty()) bodies.push_back(body.body.name);
   }
   for (const auto& [body, holders] : asked.holds) {
     const auto held = std::find(bodies.begin(), bodies.end(), body);
@@ -212,7 +212,7 @@ std::optional<std::vector<std::uint16_t>> bodiesNamed(const std::string& name, c
   if (contains(config.rigid_off, name)) return found;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     const BodyConfig& body = config.bodies[b];
-    const bool whole_link = !body.link.empty() && (name == body.link || name == LINK + body.link);
+    const bool whole_link = !body.body.link.empty() && (name == body.body.link || name == LINK + body.body.link);
     if (body.body.name == name && !whole_link) return std::vector{static_cast<std::uint16_t>(b)};
   }
   std::vector<std::string> links;
@@ -228,7 +228,7 @@ std::optional<std::vector<std::uint16_t>> bodiesNamed(const std::string& name, c
     if (!robot.named || (robot.known && !contains(robot.links, links[0]))) return std::nullopt;
   }
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    const std::string& link = config.bodies[b].link;
+    const std::string& link = config.bodies[b].body.link;
     if (!link.empty() && contains(links, link)) found.push_back(static_cast<std::uint16_t>(b));
   }
   return found;

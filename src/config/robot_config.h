@@ -69,8 +69,10 @@ struct Robot {
   std::vector<std::string> missing;                             ///< what should be watched and is not: a sentence each
   std::vector<std::string> excluded;                            ///< what has no surface to watch: a clause each
   std::vector<std::string> hints;                               ///< what its owner should see: a sentence each
-  std::string text;                                             ///< of both files
-  std::map<std::string, std::string> parameters;                ///< resolved names: what they held, or nothing
+  std::vector<std::string> doubts;                ///< of hints, why a link may not be what it is taken for
+  std::string text;                               ///< of both files
+  std::string description;                        ///< the URDF alone
+  std::map<std::string, std::string> parameters;  ///< resolved names: what they held, or nothing
 };
 
 /// A body that a hand holds, by robot/holds: as long as it does, their contacts are expected.

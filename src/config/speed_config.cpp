@@ -16,6 +16,15 @@ SpeedLaw readSpeedLaw(ParameterReader section) {
   return law;
 }
 
+IntentConfig readIntent(ParameterReader section) {
+  IntentConfig intent;
+  intent.horizon_s = section.number("horizon_s", 0.01, MOST_PROMISED_S);
+  intent.deviation_m = section.number("deviation_m", 0, LARGE);
+  intent.deviation_rate_m_s = section.number("deviation_rate_m_s", 0.0, 0, LARGE);
+  section.finish();
+  return intent;
+}
+
 bool isBounded(const SpeedBound& speed) { return std::isfinite(speed.max_m_s) || speed.last_step_factor > 0; }
 
 /// Bodies that move by themselves, or with a link.
@@ -31,9 +40,14 @@ void readSpeeds(ParameterReader& reader, MonitorConfig& config) {
   config.speed = speedBoundOf(reader, {});
   config.max_acceleration_m_s2 = reader.number("max_acceleration_m_s2", 0.0, 0, LARGE);
   if (reader.has("speed_scale")) config.speed_law = readSpeedLaw(reader.neededSection("speed_scale"));
+  if (reader.has("intent")) config.intent = readIntent(reader.neededSection("intent"));
 }
 
 void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config) {
+  if (config.intent && !config.promises()) {
+    reader.fail("intent",
+                "needs distances and a speed bound: give max_speed_m_s, with effects/clearance not off, or remove it");
+  }
   if (!config.speed_law) return;
   if (config.robot_asked.speed_factor > 0 && !std::isfinite(config.robot_asked.speedOr(config.speed).max_m_s)) {
     reader.fail("robot/speed_factor",

@@ -72,41 +72,49 @@ void check(const Body& body, std::size_t bodies) {
   if (!ascending || (!apart.empty() && apart.back() >= bodies)) {
     refuse("lists bodies that it is not tested against; they must ascend, and there are " + std::to_string(bodies));
   }
-  const ReferenceFrame* reference = body.reference.get();
-  if (reference &&
-      (reference->positions.size() != n || (!reference->radius_m.empty() && reference->radius_m.size() != n))) {
-    refuse("needs " + std::to_string(n) + " positions and no or as many radii in its reference frame");
+  if (body.reference && body.reference->size() != n) {
+    refuse("needs " + std::to_string(n) + " positions in its reference frame, got " +
+           std::to_string(body.reference->size()));
   }
 }
+
+bool isSet(const SceneBody& set, const Body& body) { return sameBody(set.setup, body); }
 
 }  // namespace
 
 bool SceneArrays::holds(const std::vector<Body>& bodies) const {
-  const bool any_set = !body_levels_.empty();
-  return any_set && std::equal(bodies_.begin(), bodies_.end(), bodies.begin(), bodies.end(),
-                               [](const SceneBody& set, const Body& body) { return sameBody(set.setup, body); });
+  return std::equal(bodies_.begin(), bodies_.end(), bodies.begin(), bodies.end(), isSet);
 }
 
-void SceneArrays::setBodies(const std::vector<Body>& bodies) {
+std::size_t SceneArrays::setBodies(const std::vector<Body>& bodies) {
   if (bodies.size() >= OBSTACLE_BODY) {
     throw std::invalid_argument(std::to_string(bodies.size()) + " bodies; at most 65534 are possible");
   }
   for (const Body& body : bodies) check(body, bodies.size());
-  bodies_ = std::vector<SceneBody>(bodies.size());  // resize() would ask old libraries' types to be copied
-  face_order_.clear();
+  const auto others = std::mismatch(bodies_.begin(), bodies_.end(), bodies.begin(), bodies.end(), isSet).first;
+  const auto held = static_cast<std::size_t>(others - bodies_.begin());
+  std::vector<SceneBody> made(bodies.size());  // resize() would ask old libraries' types to be copied
+  std::move(bodies_.begin(), others, made.begin());
+  bodies_.swap(made);
   vertex_count_ = 0;
   height_ = 2;
   Index vertex_begin = 0, edge_begin = 0, face_begin = 0;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     SceneBody& body = bodies_[b];
     const Topology& t = *bodies[b].topology;
-    body.setup = bodies[b];
-    body.setup.t0 = body.setup.t1 = nullptr;  // of this step alone
-    body.setup.radius_m = nullptr;
-    body.vertex_begin = vertex_begin;
-    body.edge_begin = edge_begin;
-    body.face_begin = face_begin;
-    buildTrees(body, *bodies[b].t0);
+    if (b >= held) {
+      body.setup = bodies[b];
+      body.setup.t0 = body.setup.t1 = nullptr;  // of this step alone
+      body.setup.radius_m = nullptr;
+      body.vertex_begin = vertex_begin;
+      body.edge_begin = edge_begin;
+      body.face_begin = face_begin;
+      face_order_.resize(face_begin);
+      buildTrees(body, *bodies[b].t0);
+    }
+    body.recorded = false;  // its vertices may be in another place, where there was no room
+    for (const ClusterTree& tree : body.trees) height_ = std::max(height_, tree.height());
+    vertex_count_ += body.usedCount();
     vertex_begin += static_cast<Index>(t.vertexCount());
     edge_begin += static_cast<Index>(t.edges().size());
     face_begin += static_cast<Index>(t.faces().size());
@@ -118,6 +126,7 @@ void SceneArrays::setBodies(const std::vector<Body>& bodies) {
   radii_.clear();
   setReaches();
   makeRoom();
+  return held;
 }
 
 void SceneArrays::buildTrees(SceneBody& body, const Positions& rest) {
@@ -155,9 +164,6 @@ void SceneArrays::buildTrees(SceneBody& body, const Positions& rest) {
   flat.resize(3 * t.faces().size());
   for (std::size_t f = 0; f < t.faces().size(); ++f) std::copy(t.faces()[f].begin(), t.faces()[f].end(), &flat[3 * f]);
   buildTree(body, FeatureKind::FACE, flat, 3, face_ranks, internal_of_local, rest);
-
-  for (const ClusterTree& tree : body.trees) height_ = std::max(height_, tree.height());
-  vertex_count_ += used.size();
 }
 
 void SceneArrays::makeRoom() {

@@ -60,6 +60,8 @@ struct SceneBody {
   bool sewn_known = false;                        ///< for the vertices as they are
   Seams seams;                                    ///< by which it is sewn, or was
   std::vector<std::uint8_t> repeated_slot;        ///< Seams::repeated, by slot
+  bool open_known = false;                        ///< which of its faces are of open parts was looked for
+  std::vector<std::uint8_t> open_slot;            ///< openFaces(), by slot; empty: all are, or it is closed
   bool translates = false;  ///< all vertices have exactly the same displacement in this step (at rest included)
 
   const ClusterTree& tree(FeatureKind k) const { return trees[static_cast<int>(k)]; }
@@ -74,17 +76,24 @@ struct SceneBody {
     return true;
   }
   std::size_t usedCount() const { return slot_vertex.size(); }
-  /// In this step others can be inside of it, and must not: closed, nothing of its surface is left out, no container.
-  bool hasInside() const { return (setup.topology->isClosed() || sewn) && !setup.shell && !masked; }
+  /// In this step others can be inside of it, and must not: closed, or parts of it are, nothing of its surface is left
+  /// out, no container.
+  bool hasInside() const {
+    return (setup.topology->isClosed() || sewn || !open_slot.empty()) && !setup.shell && !masked;
+  }
   /// The face in the slot does not count for what is inside.
-  bool isRepeated(std::size_t slot) const { return sewn && repeated_slot[slot] != 0; }
+  bool enclosesNothing(std::size_t slot) const {
+    return sewn ? repeated_slot[slot] != 0 : !open_slot.empty() && open_slot[slot] != 0;
+  }
 };
 
 class SceneArrays {
  public:
-  /// Positions at t0 guide the order of features in memory; any will do. Throws std::invalid_argument naming the body
-  /// when positions and topology do not fit.
-  void setBodies(const std::vector<Body>& bodies);
+  /// Positions at t0 guide the order of features in memory; any will do. Returns how many, from the first one on, were
+  /// set already: they stay as they are. Throws std::invalid_argument naming the body when positions and topology do
+  /// not fit; after any exception forgetBodies() comes first.
+  std::size_t setBodies(const std::vector<Body>& bodies);
+  void forgetBodies() { bodies_.clear(); }
   /// Whether these are the bodies that were set, wherever they are now.
   bool holds(const std::vector<Body>& bodies) const;
 

@@ -293,6 +293,14 @@ void SceneArrays::sew(SceneBody& body, const Body& motion, bool all_finite) cons
       body.seams = std::move(seams);
     }
     body.sewn = !body.seams.vertices.empty();
+    if (!body.open_known) {
+      body.open_slot.clear();
+      const std::vector<std::uint8_t> open = openFaces(*body.setup.topology);
+      for (const Index rank : body.rank(FeatureKind::FACE)) {
+        if (!open.empty()) body.open_slot.push_back(open[face_order_[rank]]);
+      }
+      body.open_known = true;
+    }
   }
   body.sewn_known = known;
 }

@@ -1,11 +1,25 @@
 #include "culling/seams.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 #include <utility>
 
 namespace dccd {
 namespace {
+
+std::array<Edge, 3> edgesOf(const Face& face) {
+  const auto edge = [](Index a, Index b) { return a < b ? Edge{a, b} : Edge{b, a}; };
+  return {edge(face[0], face[1]), edge(face[1], face[2]), edge(face[0], face[2])};
+}
+
+/// Equal for equal edges; others look like chance (the finalizer of splitmix64).
+std::uint64_t mixed(const Edge& edge) {
+  std::uint64_t x = std::uint64_t{edge[0]} << 32 | edge[1];
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
 
 /// Positions at both ends of a step.
 struct Places {
@@ -58,11 +72,11 @@ std::vector<Index> firstAtPlace(const Topology& topology, const Positions& t0, c
   return first;
 }
 
-/// The first edge that is there an odd number of times, or the end.
-std::vector<Edge>::const_iterator firstOdd(const std::vector<Edge>& sorted) {
-  auto first = sorted.begin();
-  while (first != sorted.end()) {
-    const auto last = std::upper_bound(first, sorted.end(), *first);
+/// The first edge of these, sorted, that is there an odd number of times, or the end.
+std::vector<Edge>::const_iterator firstOdd(std::vector<Edge>::const_iterator first,
+                                           const std::vector<Edge>::const_iterator end) {
+  while (first != end) {
+    const auto last = std::find_if(first, end, [&](const Edge& edge) { return edge != *first; });
     if ((last - first) % 2 != 0) break;
     first = last;
   }
@@ -90,15 +104,48 @@ Seams seamsOf(const Topology& topology, const Positions& t0, const Positions& t1
     const Face& f = merged[i].first;
     if (f[0] == f[1] || f[1] == f[2] || (i > 0 && f == merged[i - 1].first)) continue;
     seams.repeated[merged[i].second] = 0;
-    edges.insert(edges.end(), {{f[0], f[1]}, {f[1], f[2]}, {f[0], f[2]}});
+    const auto of_face = edgesOf(f);
+    edges.insert(edges.end(), of_face.begin(), of_face.end());
   }
   std::sort(edges.begin(), edges.end());
   if (edges.empty()) return {};
-  if (const auto odd = firstOdd(edges); odd != edges.end()) return {{}, {}, *odd};
+  if (const auto odd = firstOdd(edges.begin(), edges.end()); odd != edges.end()) return {{}, {}, *odd};
   for (const Index v : topology.usedVertices()) {
     if (first[v] != v) seams.vertices.push_back({first[v], v});
   }
   return seams;
+}
+
+std::vector<std::uint8_t> openFaces(const Topology& topology) {
+  const std::vector<Face>& faces = topology.faces();
+  std::vector<Index> first(topology.vertexCount());  // a vertex that it is joined with, itself at the end
+  std::iota(first.begin(), first.end(), Index{0});
+  const auto partOf = [&](Index v) {
+    while (first[v] != v) v = first[v] = first[first[v]];
+    return v;
+  };
+  for (const Face& f : faces) {
+    first[partOf(f[1])] = partOf(f[0]);
+    first[partOf(f[2])] = partOf(f[0]);
+  }
+  // An even number of equal terms is no sum: a part that has one is open. Of the others each edge is counted.
+  std::vector<std::uint64_t> sum(topology.vertexCount(), 0);
+  for (const Face& f : faces) {
+    for (const Edge& edge : edgesOf(f)) sum[partOf(f[0])] ^= mixed(edge);
+  }
+  std::vector<Edge> edges;
+  for (const Face& f : faces) {
+    if (sum[partOf(f[0])] != 0) continue;
+    const auto of_face = edgesOf(f);
+    edges.insert(edges.end(), of_face.begin(), of_face.end());
+  }
+  std::sort(edges.begin(), edges.end());
+  for (auto odd = firstOdd(edges.begin(), edges.end()); odd != edges.end(); odd = firstOdd(odd + 1, edges.end()))
+    sum[partOf((*odd)[0])] = 1;
+  std::vector<std::uint8_t> open;
+  for (const Face& f : faces) open.push_back(sum[partOf(f[0])] != 0);
+  if (std::count(open.begin(), open.end(), 0) == 0) open.clear();
+  return open;
 }
 
 bool hold(const Seams& seams, const Positions& t0, const Positions& t1) {

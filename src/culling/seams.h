@@ -1,5 +1,6 @@
-// A surface whose corners are doubled, as exporters write it, has a border only by its numbers: where the corners lie
-// at one place it is as closed as the same surface with shared ones.
+// What encloses space of a surface with a border. One whose corners are doubled, as exporters write it, has a border
+// only by its numbers: where the corners lie at one place it is as closed as the same surface with shared ones. And one
+// loose face beside a closed shell does not open it.
 #pragma once
 
 #include <array>
@@ -22,6 +23,10 @@ struct Seams {
 /// must lie on an even number of the rest. Nothing for a mesh that is closed by its numbers. before: of an earlier
 /// step.
 Seams seamsOf(const Topology& topology, const Positions& t0, const Positions& t1, const Seams& before = {});
+
+/// Of a mesh with a border by its numbers, the faces that enclose nothing: a part of the surface, faces joined by
+/// vertices, is open where some edge lies on an odd number of its faces. Per face; 1: of an open part. Empty: all are.
+std::vector<std::uint8_t> openFaces(const Topology& topology);
 
 /// Whether the vertices of all pairs are at one place throughout the step.
 bool hold(const Seams& seams, const Positions& t0, const Positions& t1);

@@ -1,5 +1,6 @@
-// Pairs in a plane across an axis: layers on a table, a towel that is drawn over another one. The four points have one
-// coordinate in common, f is 0, and all happens in the other two, where these doubles tell what meets, and when.
+// Pairs in a plane across an axis, or at 45 degrees to two: layers on a table, a towel that is drawn over another one.
+// The four points have one coordinate in common, or two that are equal but for a sign: f is 0, and all happens in
+// two others, where these doubles tell what meets, and when.
 //
 // Sides. On which side of the line ab a point p is, is the sign of (b - a) x (p - a) = c0 s^2 + c1 s t + c2 t^2, with
 // s = 1 - t. At t = 0, when all sides are certain:
@@ -184,20 +185,29 @@ class FlatPair {
   Vector x_[2][4];
 };
 
-bool isAcross(const PairMotion& pair, int time, int axis) {
-  const auto& x = pair.x[time];
-  return x[0][axis] == x[1][axis] && x[0][axis] == x[2][axis] && x[0][axis] == x[3][axis];
-}
+/// Across an axis; or, where `other` is not -1, where two coordinates are equal but for a sign.
+struct Plane {
+  int axis, other;  ///< seen along `axis` nothing of it is lost
+  double sign;
+
+  bool holds(const PairMotion& pair, int time) const {
+    const auto& x = pair.x[time];
+    return std::all_of(
+        x, x + 4, [&](const double(&p)[3]) { return other < 0 ? p[axis] == x[0][axis] : p[axis] == sign * p[other]; });
+  }
+};
+constexpr Plane PLANES[] = {{0, -1, 0}, {1, -1, 0}, {2, -1, 0}, {0, 1, 1}, {0, 1, -1},
+                            {0, 2, 1},  {0, 2, -1}, {1, 2, 1},  {1, 2, -1}};
 
 }  // namespace
 
 ElementaryResult decideInPlane(PairKind kind, const PairMotion& pair, int toc_bits) {
   int axis = -1;
   bool stays = false;
-  for (int k = 0; k < 3 && !stays; ++k) {
-    if (!isAcross(pair, 0, k)) continue;
-    axis = k;
-    stays = isAcross(pair, 1, k);
+  for (const Plane& plane : PLANES) {
+    if (stays || !plane.holds(pair, 0)) continue;
+    axis = plane.axis;
+    stays = plane.holds(pair, 1);
   }
   if (axis < 0) return undecided(Tier::DOUBLE_DOUBLE);
   const FlatPair flat(kind, pair, axis);

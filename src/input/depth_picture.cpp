@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "input/short_text.h"
@@ -10,7 +11,8 @@ namespace dccd {
 
 namespace {
 
-constexpr std::size_t MOST_TOLD = 32;  // characters of an encoding
+constexpr std::size_t MOST_TOLD = 32;       // characters of an encoding
+constexpr std::size_t MOST_PINHOLE = 4096;  // bytes; ten times those of a CameraInfo with all distortion
 
 template <class T>
 T numberAt(const std::uint8_t* at, bool big_endian) {
@@ -21,6 +23,13 @@ T numberAt(const std::uint8_t* at, bool big_endian) {
   return value;
 }
 
+/// [m] The largest number says that there is none: drivers send it where nothing came back, or where a depth did not
+/// fit.
+float depthOf(std::uint16_t millimetres) {
+  constexpr std::uint16_t LARGEST = std::numeric_limits<std::uint16_t>::max();
+  return millimetres == LARGEST ? std::numeric_limits<float>::quiet_NaN() : 0.001f * millimetres;
+}
+
 }  // namespace
 
 void DepthView::depthsInto(std::vector<float>& depths) const {
@@ -29,7 +38,7 @@ void DepthView::depthsInto(std::vector<float>& depths) const {
   for (std::size_t row = 0; row < height; ++row) {
     const std::uint8_t* at = data + row * row_step;
     if (in_millimetres) {
-      for (std::size_t i = 0; i < width; ++i) *out++ = 0.001f * numberAt<std::uint16_t>(at + 2 * i, big_endian);
+      for (std::size_t i = 0; i < width; ++i) *out++ = depthOf(numberAt<std::uint16_t>(at + 2 * i, big_endian));
     } else {
       for (std::size_t i = 0; i < width; ++i) *out++ = numberAt<float>(at + 4 * i, big_endian);
     }
@@ -65,7 +74,10 @@ DepthView readDepth(WireReader& wire) {
 
 PinholeView readPinhole(WireReader& wire) {
   PinholeView view;
-  readHeader(wire);
+  view.stamp_ns = readHeader(wire).stamp_ns;
+  const std::size_t size = wire.left();
+  if (size > MOST_PINHOLE) throw WireError("it has " + std::to_string(size) + " bytes, which no pinhole needs");
+  view.said = wire.rest();
   view.height = wire.read<std::uint32_t>("height");
   view.width = wire.read<std::uint32_t>("width");
   wire.readString("distortion_model");

@@ -20,7 +20,8 @@ struct DepthView {
   bool in_millimetres = false;  ///< 16 bits, else floats [m]
   bool big_endian = false;
   std::size_t size() const { return height * width; }
-  /// [m] Row by row, as they came: 0, or what is no number, is no measurement; infinity: nothing came back.
+  /// [m] Row by row, as they came: 0, or what is no number, is no measurement; infinity: nothing came back. The largest
+  /// of 16 bits is no number.
   void depthsInto(std::vector<float>& depths) const;
 };
 /// Throws WireError for what is no depth, and for rows that are not there.
@@ -28,6 +29,8 @@ DepthView readDepth(WireReader& wire);
 
 /// Where a pixel looks: through ((column - cx) / fx, (row - cy) / fy, 1) of the optical frame.
 struct PinholeView {
+  StampNs stamp_ns = 0;
+  std::string said;  ///< all of the message but its header, as it came: two are alike where it is; empty: it is none
   std::size_t height = 0, width = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
   std::string distortion;  ///< what a picture has that is not rectified, in words; empty: none

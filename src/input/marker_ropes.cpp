@@ -13,11 +13,22 @@ namespace dccd {
 
 namespace {
 
+// A publisher that stamps each marker with the time at which it makes it needs less for all of them.
+constexpr double MOST_APART_S = 1e-3;
+
 void requirePoints(const MarkerView& marker) {
   const bool pairs = marker.type == MARKER_LINE_LIST;
   if (pairs ? marker.points.size % 2 == 0 : marker.points.size > 1) return;
   throw WireError("marker " + nameOf(marker) + " has " + std::to_string(marker.points.size) +
                   (pairs ? " points, and a LINE_LIST two for each segment" : " point, and a rope needs 2"));
+}
+
+/// The earliest and the latest of a message: one frame shows all of them at one time.
+void requireOneTime(const MarkerView& first, const MarkerView& last) {
+  const double apart_s = secondsBetween(first.header.stamp_ns, last.header.stamp_ns);
+  if (apart_s <= MOST_APART_S) return;
+  throw WireError("marker " + nameOf(last) + " is stamped " + std::to_string(apart_s) + " s after " + nameOf(first) +
+                  "; give the ropes of a message one stamp, or name one rope a body by marker/id");
 }
 
 void add(const MarkerView& marker, Ropes& ropes) {
@@ -54,15 +65,10 @@ Eigen::Affine3d poseOf(const MarkerView& marker) {
 
 Index addLine(const Positions& points, std::size_t begin, std::size_t end, std::vector<Edge>& edges) {
   auto at = static_cast<Index>(begin);
-  for (std::size_t i = begin + 1; i < end;) {
-    std::size_t next = i;  // that does not equal the point before i
-    while (next < end && points[next] == points[i - 1]) ++next;
-    if (next - i >= 2) {
-      i = next;
-      continue;
-    }
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    if (points[i] == points[at]) continue;
     edges.push_back({at, static_cast<Index>(i)});
-    at = static_cast<Index>(i++);
+    at = static_cast<Index>(i);
   }
   return at;
 }
@@ -128,7 +134,10 @@ DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
   DecodedMesh mesh;
   start(markers[0]->header, mesh);
   std::size_t count = 0;
+  const MarkerView *first = markers[0], *last = markers[0];
   for (const MarkerView* one : markers) {
+    if (one->header.stamp_ns < first->header.stamp_ns) first = one;
+    if (one->header.stamp_ns > last->header.stamp_ns) last = one;
     DecodedMesh other;
     start(one->header, other);
     if (other.frame_id != mesh.frame_id) {
@@ -138,6 +147,8 @@ DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
     }
     count += one->points.size;
   }
+  requireOneTime(*first, *last);
+  mesh.stamp_ns = first->header.stamp_ns;  // so that no time that is reported is late
   checkCount(count);
   Ropes ropes = ropesOf(markers);
   if (hasFixedTopology()) {

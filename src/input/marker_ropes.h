@@ -44,8 +44,8 @@ struct Ropes {
 Ropes ropesOf(std::vector<const MarkerView*> markers);
 
 /// Adds the edges of a line through the points from `begin` to before `end`. Returns the point at which it ends. Of
-/// three and more equal points in a row the first stands for all: the edges before and after them, which touch there,
-/// are neighbours then. No edge has the others, as long as they are equal.
+/// equal points in a row the first stands for all: the edges before and after them, which touch there, are neighbours
+/// then. No edge has the others, as long as they are equal.
 Index addLine(const Positions& points, std::size_t begin, std::size_t end, std::vector<Edge>& edges);
 
 /// Whether these are the ropes of the message before: as many, of as many points. Throws WireError where some have

@@ -256,7 +256,7 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   if (config_.source == TopologySource::AUTO && !is_rope && !organised && !config_.rows && !config_.cols) {
     refuseMessage(
         "an unorganised point cloud has no topology; set topology/rows and topology/cols for a grid, or "
-        "topology/source to polyline or file");
+        "topology/source to polyline or file (rows:=, cols:= and topology:= of the launch files)");
   }
   if (!is_rope) takeFixed(cloud.size(), cloud.height, cloud.width, mesh);
   if (!is_rope && !hasFixedTopology() && cloud.size() >= LEAST_PICTURE) {

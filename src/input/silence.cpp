@@ -1,5 +1,7 @@
 #include "input/silence.h"
 
+#include <cstring>
+
 #include <ros/time.h>
 
 #include "input/known_types.h"
@@ -10,6 +12,7 @@ namespace dccd {
 namespace {
 
 constexpr std::size_t MAX_NAMES = 6;
+constexpr const char* YET = ", nor anything else that could be a mesh, yet";
 
 /// Published topics with a type that can be a mesh.
 std::string meshTopics(const std::map<std::string, std::string>& types) {
@@ -48,8 +51,14 @@ std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<
   }
   if (given_by.empty()) return text;
   const std::string names = meshTopics(published);
-  return text + "; give the mesh's topic with " + given_by + "; " +
-         (names.empty() ? "no topic of a mesh type is published" : "published are " + names);
+  // Where nothing else could be meant it was given, and is waited for.
+  if (names.empty()) return text + YET;
+  return text + "; give the mesh's topic with " + given_by + "; published are " + names;
+}
+
+bool isYetToCome(const std::string& silence) {
+  const std::size_t length = std::strlen(YET);
+  return silence.size() > length && silence.compare(silence.size() - length, length, YET) == 0;
 }
 
 std::string unheardMapsHint(const std::string& listened, const std::map<std::string, std::string>& published) {

@@ -20,6 +20,9 @@ struct AwaitedTopic {
 /// `published`: what there is, datatypes by topic; empty where the master does not answer.
 std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<std::string, std::string>& published);
 
+/// The sentence is of publishers alone that nobody has heard yet, where nothing else could be meant.
+bool isYetToCome(const std::string& silence);
+
 /// A sentence about octomaps that are published on other topics than `listened`, on which none has come; empty: there
 /// are none.
 std::string unheardMapsHint(const std::string& listened, const std::map<std::string, std::string>& published);

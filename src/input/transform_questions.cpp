@@ -262,6 +262,46 @@ std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, cons
   return first;
 }
 
+std::string TransformFeed::doubtNextTo(const std::string& target, const std::string& source, StampNs stamp_ns) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::string doubt;
+  if (!findWay(target, source, [&](const Frame& frame) { return parentAt(frame, stamp_ns); })) return doubt;
+  forEachKeptOnWay([&](const Frame& frame) {
+    const auto next = after(frame, stamp_ns);
+    if (next == frame.sent.begin() || !doubt.empty()) return;
+    const auto at = std::prev(next);
+    const bool is_sent = at->first == stamp_ns, has_next = next != frame.sent.end();
+    const std::string name = "frame '" + shortText(frame.name, MAX_NAME) + "'";
+    if (is_sent && at->second.gap) {
+      doubt = "a transform of " + name + " came that is not used";
+    } else if (!is_sent && has_next && at->second.parent != next->second.parent) {
+      doubt = name + " changed its parent";
+    }
+    const auto first = at == frame.sent.begin() ? at : std::prev(at);
+    const auto end = has_next && std::next(next) != frame.sent.end() ? std::next(next, 2) : frame.sent.end();
+    const auto isAnothers = [&](const auto& sample) { return sample.second.sender != at->second.sender; };
+    if (std::any_of(first, end, isAnothers)) doubt = "transforms of " + name + " came from two publishers";
+  });
+  return doubt;
+}
+
+std::uint64_t TransformFeed::staticSince(const std::string& target, const std::string& source) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::uint64_t since = 0;
+  if (!findWay(target, source, newestParentOf)) return since;
+  for (const Chain* chain : {&from_target_, &from_source_}) {
+    for (std::size_t i = 0; i + 1 < chain->size(); ++i) since = std::max(since, (*chain)[i]->fixed_since);
+  }
+  return since;
+}
+
+std::string TransformFeed::rootOf(const std::string& name) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Frame *const frame = frameOf(name), *root = frame;
+  for (std::size_t i = 0; root && i < MAX_CHAIN && newestParentOf(*root); ++i) root = newestParentOf(*root);
+  return root == frame ? std::string() : root->name;
+}
+
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions) {
   if (target_from_source.matrix() == Eigen::Matrix4d::Identity()) return;  // keeps the bits
   for (Vec3& p : positions) p = target_from_source * p;

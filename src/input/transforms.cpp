@@ -251,7 +251,10 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       continue;
     }
     if (is_static) {
-      if (frame->fixed.parent && !isSame(frame->fixed, sent, tolerance::SAME_PLACE)) ++times_forgotten_;
+      if (frame->fixed.parent && !isSame(frame->fixed, sent, tolerance::SAME_PLACE)) {
+        ++times_forgotten_;
+        frame->fixed_since = change_;
+      }
       frame->fixed = sent;
     } else {
       const Jump jump = jumpOf(transform, *sent.sender);
@@ -293,8 +296,11 @@ void TransformFeed::passOver(const geometry_msgs::TransformStamped& transform) {
   const auto known = frames_.find(unslashed(transform.child_frame_id));
   if (known == frames_.end()) return;
   Frame& frame = known->second;
-  if (frame.is_static.value_or(false)) ++times_forgotten_;
   ++change_;
+  if (frame.is_static.value_or(false)) {
+    ++times_forgotten_;
+    frame.fixed_since = change_;
+  }
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
   const auto at = frame.sent.find(stamp_ns), next = frame.sent.upper_bound(stamp_ns);
   if (at != frame.sent.end()) at->second.gap = true;

@@ -74,6 +74,15 @@ class TransformFeed {
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
   std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
 
+  /// Why source may have been elsewhere in target at the stamp than lookup() says, as far as what was sent next to it
+  /// tells: at the stamp it was sent elsewhere, too, between two transforms its parent changed, or these are of two
+  /// publishers. Empty: nothing tells it.
+  std::string doubtNextTo(const std::string& target, const std::string& source, StampNs stamp_ns) const;
+  /// Grows once a static frame, of those that target_from_source is made of now, is sent elsewhere.
+  std::uint64_t staticSince(const std::string& target, const std::string& source) const;
+  /// The frame at the top of the tree that the frame is in now; empty: it has no parent.
+  std::string rootOf(const std::string& frame) const;
+
   /// Of the frames that target_from_source is made of now, that of which the stamps run ahead of their arrival by the
   /// most [s]; none: nobody knows.
   struct Ahead {
@@ -115,6 +124,7 @@ class TransformFeed {
     std::optional<bool> is_static;  ///< as tf2 takes it, for good, from what came first; none: it is a parent alone
     std::map<StampNs, Sent> sent;   ///< of one that moves
     Sent fixed;                     ///< of one that is static
+    std::uint64_t fixed_since = 0;  ///< change_ when that was sent elsewhere; 0: it was not
     std::map<std::string, StampNs> newest;  ///< of each publisher; 0: it went back
     bool is_cut = false;                    ///< older ones were sent
     bool is_apart = false;                  ///< some were forgotten that the buffer holds; it gets no more

@@ -36,6 +36,8 @@ class WireReader {
   WireReader(const std::uint8_t* data, std::size_t size) : at_(data), left_(size) {}
 
   std::size_t left() const { return left_; }
+  /// What is not read yet.
+  std::string_view rest() const { return {reinterpret_cast<const char*>(at_), left_}; }
 
   template <typename T>
   T read(const char* field) {

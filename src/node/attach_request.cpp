@@ -68,7 +68,7 @@ class AttachReader {
     std::vector<std::string> known = config_.robot.links;
     bool found = std::find(known.begin(), known.end(), request_.link) != known.end();
     for (const BodyConfig& body : config_.bodies) {
-      if (!body.isRigid() || !body.link.empty()) continue;
+      if (!body.isRigid() || !body.body.link.empty()) continue;
       known.push_back(body.body.name);
       if (found || body.body.name != request_.link) continue;
       found = true;

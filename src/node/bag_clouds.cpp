@@ -22,15 +22,25 @@ std::vector<std::string> BagClouds::infoTopics() const {
   return topics;
 }
 
-void BagClouds::hearCameraInfo(const rosbag::MessageInstance& message) {
+std::optional<LoadedMap> BagClouds::hearCameraInfo(const rosbag::MessageInstance& message) {
   const auto sources = by_info_topic_.find(message.getTopic());
-  if (sources == by_info_topic_.end()) return;
+  if (sources == by_info_topic_.end()) return std::nullopt;
   const std::string problem = cameraInfoProblem(message.getDataType(), message.getMD5Sum());
-  for (const std::size_t source : sources->second) clouds_.setCameraInfo(source, problem, bytesOf(message));
+  std::optional<LoadedMap> void_map;
+  for (const std::size_t source : sources->second) {
+    const std::string why_void = clouds_.setCameraInfo(source, problem, bytesOf(message));
+    if (why_void.empty()) continue;
+    clouds_.refuse(source, receiptOf(message), why_void);
+    void_map.emplace();
+    void_map->problem = why_void;
+    void_map->stamp_ns = void_map->receipt_ns = receiptOf(message);
+  }
+  return void_map;
 }
 
 void BagClouds::hold(const rosbag::MessageInstance& message) {
   const std::size_t source = sourceOf(message);
+  if (held_[source] && clouds_.hasFrame()) clouds_.miss(source, "too many came, and it gave way to a newer one");
   held_[source] = CloudMessage{source, message.getDataType(), bytesOf(message), receiptOf(message)};
 }
 

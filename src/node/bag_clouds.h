@@ -19,8 +19,9 @@ class BagClouds {
   BagClouds(const MonitorConfig& config, const TransformFeed& feed, const MapMemory& memory);
 
   std::vector<std::string> infoTopics() const;
-  /// A message of any topic: what is of none of infoTopics() is left alone.
-  void hearCameraInfo(const rosbag::MessageInstance& message);
+  /// A message of any topic: what is of none of infoTopics() is left alone. Returns what it makes of the map: nothing,
+  /// or that this is void, for the message says where a picture really was.
+  std::optional<LoadedMap> hearCameraInfo(const rosbag::MessageInstance& message);
   void hold(const rosbag::MessageInstance& message);
   void refuse(const rosbag::MessageInstance& message, const std::string& problem);
   /// What the map is with each cloud that is held, once.

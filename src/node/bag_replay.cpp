@@ -32,10 +32,11 @@ std::string bagsInWords(const std::vector<std::string>& paths) {
 }
 
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
-LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config, const MapMemory& memory) {
+LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config, const MapMemory& memory,
+                  MapOdds* odds = nullptr) {
   LoadedMap map;
   map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
-  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory);
+  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory, nullptr, odds);
   map.receipt_ns = receiptOf(message);
   if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
   return map;
@@ -52,13 +53,14 @@ struct BagReplay::Run {
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
   const MapMemory memory{pipeline.config()};
+  MapOdds odds;
   BagClouds clouds{pipeline.config(), feed, memory};
   std::optional<LookAheadScore> look_ahead;
   std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one message
   std::map<std::string, std::size_t> frames_of_topic;
   std::map<std::string, std::uint64_t> passed_over;  // messages that are of no body
   BagReplaySummary summary;
-  std::set<std::string> complained;
+  std::set<std::string> complained, doubts;
   bool lacked_transform = false;
   std::vector<ros::Time> last_came;  // of each body, its last message; 0: none
   bool repeats_latched = false;      // as rosbag record --repeat-latched does at the begin of a piece
@@ -127,7 +129,12 @@ struct BagReplay::Run {
       if (problem.empty()) return clouds.hold(message);
       clouds.refuse(message, problem);
     }
-    setMap(readMap(message, config, memory), static_cast<std::int64_t>(message.getTime().toNSec()));
+    setMap(readMap(message, config, memory, &odds), static_cast<std::int64_t>(message.getTime().toNSec()));
+  }
+
+  void cameraInfo(const rosbag::MessageInstance& message) {
+    std::optional<LoadedMap> map = clouds.hearCameraInfo(message);
+    if (map) setMap(std::move(*map), static_cast<std::int64_t>(message.getTime().toNSec()));
   }
 
   /// They are known from the start: a picture may come before its own.
@@ -152,6 +159,9 @@ struct BagReplay::Run {
       const SafeUntil& promise = pipeline.promises().promise();
       if (promise.isPromise()) summary.promised_s.push_back(promise.seconds());
       lacked_transform = lacked_transform || outcome.reason.find("no transform") != std::string::npos;
+      for (const std::string& doubt : pipeline.statement().doubts) {
+        if (doubts.insert(doubt).second) summary.doubts.push_back(doubt);
+      }
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
     }
@@ -397,7 +407,6 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   const bool may_use_map = run.pipeline.effects().mayUseMap();
   const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
-
   OpenBags::View all(run.bags);
   if (all.size() == 0) return run.summary;
   run.repeats_latched = all.begin()->isLatching();
@@ -435,7 +444,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
                                      : "");
     for (const std::string& line : run.feed.takeProblems()) run.complain("tf: " + line);
     if (is_mesh) run.meshes(bodies->second, m, bytes);
-    run.clouds.hearCameraInfo(m);
+    run.cameraInfo(m);
     const bool is_map = bag_maps && std::count(map_topics.begin(), map_topics.end(), m.getTopic()) > 0;
     if (is_map && !std::exchange(first_is_taken, false)) run.mapMessage(m);
     run.placeCloud(at);
@@ -448,7 +457,6 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.fixed_frame = run.pipeline.fixedFrame();
   run.summary.effects = run.pipeline.effects().plan();
-  run.summary.left_out = run.pipeline.monitor().leftOut();
   run.summary.promises = run.pipeline.promises().counts();
   if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();
   return run.summary;

@@ -40,10 +40,10 @@ struct BagReplaySummary {
   std::string map_source;             ///< its topic or file, and who named it, in words
   std::vector<std::string> problems;  ///< refused messages, each kind once; maps that are missing or not listened to
   std::vector<std::string> not_looked_at;  ///< a map that is not there, meshes that nobody listens to: a sentence each
+  std::vector<std::string> doubts;         ///< MonitorPipeline::doubts(), each once
   std::string unanswered_end;              ///< that other bodies moved on where no frame came any more; empty: none did
   FrameCounters frames;
   EffectPlan effects;                          ///< at the end
-  std::vector<LeftOutPair> left_out;           ///< at the end
   std::optional<LookAheadSummary> look_ahead;  ///< where look_ahead_s is above 0
   PromiseCounts promises;                      ///< of safe_until
   std::vector<double> promised_s;              ///< for how long, of each

@@ -10,6 +10,7 @@
 #include "input/mesh_views.h"
 #include "input/short_text.h"
 #include "input/steady_clock.h"
+#include "input/transform_tracks.h"
 #include "input/wire.h"
 #include "node/map_decode.h"
 
@@ -105,6 +106,7 @@ struct CloudMapping::Reading {
   ViewName view;
   const std::function<bool()>& may_wait;
   double waited_s = 0;
+  std::map<std::string, std::uint64_t> placed_by{};
   bool is_in = false;  ///< be it in part
 
   bool mayWait() {
@@ -115,33 +117,38 @@ struct CloudMapping::Reading {
   }
 };
 
+CloudMapping::CloudMapping(const MonitorConfig& config, const TransformFeed& transforms, const MapMemory& memory)
+    : config_(config), transforms_(transforms), memory_(memory), missed_(config.clouds.size()) {
+  for (const CloudSource& source : config.clouds) camera_infos_.emplace_back(cameraInfoTopic(source));
+}
+
 void CloudMapping::setFrame(const std::string& fixed_frame) {
   if (hasFrame()) return;
   frame_ = config_.octomap_frame.empty() ? fixed_frame : config_.octomap_frame;
 }
 
-void CloudMapping::setCameraInfo(std::size_t source, const std::string& problem,
-                                 const std::vector<std::uint8_t>& bytes) {
-  PinholeView pinhole;
-  try {
-    if (!problem.empty()) throw WireError(problem);
-    WireReader wire = readerOf(bytes);
-    pinhole = readPinhole(wire);
-  } catch (const WireError& error) {
-    pinhole.problem = error.what();
-  }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  pinholes_.at(source) = std::move(pinhole);
+std::string CloudMapping::setCameraInfo(std::size_t source, const std::string& problem,
+                                        const std::vector<std::uint8_t>& bytes) {
+  return camera_infos_.at(source).add(problem, bytes);
 }
 
 Eigen::Isometry3d CloudMapping::place(const std::string& frame, const CloudMessage& message, Reading& reading) const {
   Eigen::Isometry3d map_from_frame;
   std::string reason;
-  while (!transforms_.lookup(frame_, frame, reading.map.stamp_ns, map_from_frame, reason)) {
+  const StampNs stamp_ns = reading.map.stamp_ns;
+  const auto isPlaced = [&] {
+    reading.placed_by[frame] = transforms_.staticSince(frame_, frame);  // before: what comes meanwhile counts as later
+    return transforms_.lookup(frame_, frame, stamp_ns, map_from_frame, reason);
+  };
+  while (!isPlaced()) {
     if (reading.mayWait()) continue;
     throw WireError(transforms_.noTransform(frame, "'" + frame_ + "'", reason) + "; the clouds on " +
                     config_.clouds[message.source].topic + " need it");
   }
+  // Unlike a map, a cloud stays for good where it was put.
+  std::string doubt = TransformTracks(transforms_, frame_).doubtAt(frame_, frame, stamp_ns);
+  if (doubt.empty()) doubt = transforms_.doubtNextTo(frame_, frame, stamp_ns);
+  if (!doubt.empty()) throw WireError("where frame '" + frame + "' was at its stamp is not known (" + doubt + ")");
   return map_from_frame;
 }
 
@@ -151,17 +158,10 @@ SensorView CloudMapping::readPicture(const CloudMessage& message, Reading& readi
   if (picture.size() == 0) throw WireError("it has no pixels");
   const CloudSource& source = config_.clouds[message.source];
   const std::string topic = cameraInfoTopic(source);
+  std::string why_not;
   std::optional<PinholeView> pinhole;
-  while (true) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      pinhole = pinholes_[message.source];
-    }
-    if (pinhole) break;
-    if (!reading.mayWait()) {
-      throw WireError("no CameraInfo has come on " + topic +
-                      "; name its topic by camera_info in obstacle_cloud_topics, or take the camera's cloud");
-    }
+  while (!(pinhole = camera_infos_[message.source].find(picture.header.stamp_ns, why_not))) {
+    if (!reading.mayWait()) throw WireError(why_not);
   }
   if (!pinhole->problem.empty()) throw WireError("the CameraInfo on " + topic + ": " + pinhole->problem);
   if (!pinhole->distortion.empty() && !isRectified(source.topic)) {
@@ -304,7 +304,14 @@ void CloudMapping::forgetRefused(StampNs receipt_ns) {
   }
 }
 
+void CloudMapping::miss(std::size_t source, const std::string& why) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++missed_.at(source).count;
+  missed_[source].newest = shortText(why);
+}
+
 void CloudMapping::refuse(std::size_t source, StampNs receipt_ns, const std::string& problem) {
+  miss(source, problem);
   View& view = views_[{source, {}}];
   view.problem = problem;
   view.receipt_ns = receipt_ns;
@@ -336,12 +343,23 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
     return map_->leaves(limits);
   });
   if (!is_seen) {
+    miss(message.source, map.problem);
     View& view = views_[reading.view];
     view.problem = map.problem;
     view.receipt_ns = message.receipt_ns;
   }
   if (!map.surface) map.own = OwnVoxels();
-  if (reading.is_in) map.number = ++looks_;
+  if (reading.is_in) {
+    map.number = ++looks_;
+    first_ns_ = first_ns_ == 0 ? map.stamp_ns : std::min(first_ns_, map.stamp_ns);
+    placed_by_.insert(reading.placed_by.begin(), reading.placed_by.end());  // of the first cloud
+  }
+  map.placed_by = placed_by_;
+  map.first_ns = first_ns_;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    map.missed = missed_;
+  }
   const double spent_s = secondsBetween(start_ns, steadyNs()) - reading.waited_s;
   const double limit_s = config_.monitor.octomap_timeout_s > 0
                              ? std::min(config_.monitor.octomap_timeout_s, config_.answer_timeout_s)

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <map>
@@ -13,8 +14,8 @@
 #include <vector>
 
 #include "base/cloud_map.h"
-#include "input/depth_picture.h"
 #include "input/transforms.h"
+#include "node/camera_infos.h"
 #include "node/map_memory.h"
 #include "node/monitor_pipeline.h"
 
@@ -44,15 +45,13 @@ struct CloudCounters {
 /// For one thread at a time, but for what says otherwise.
 class CloudMapping {
  public:
-  CloudMapping(const MonitorConfig& config, const TransformFeed& transforms, const MapMemory& memory)
-      : config_(config), transforms_(transforms), memory_(memory), pinholes_(config.clouds.size()) {}
+  CloudMapping(const MonitorConfig& config, const TransformFeed& transforms, const MapMemory& memory);
 
   /// In which frame the map is kept, for good: the first one that is not empty; octomap_frame, if there is one.
   void setFrame(const std::string& fixed_frame);
   bool hasFrame() const { return !frame_.empty(); }
-  /// A serialised CameraInfo, or why it is none: the source's pictures are of this pinhole from now on. From any
-  /// thread.
-  void setCameraInfo(std::size_t source, const std::string& problem, const std::vector<std::uint8_t>& bytes);
+  /// CameraInfos::add(): for what it returns the view is to be refused. From any thread.
+  std::string setCameraInfo(std::size_t source, const std::string& problem, const std::vector<std::uint8_t>& bytes);
 
   /// The message becomes part of the map, which is returned; never throws: what is wrong is in LoadedMap::problem;
   /// a map has the next number where the cloud is in what the next map will show. There is no map while the newest
@@ -63,6 +62,8 @@ class CloudMapping {
                 const VoxelSurface* before = nullptr);
   /// A message that was refused undecoded counts as the newest one of its source.
   void refuse(std::size_t source, StampNs receipt_ns, const std::string& problem);
+  /// One of the source came, and becomes no part of the map. From any thread.
+  void miss(std::size_t source, const std::string& why);
 
   /// From any thread.
   CloudCounters counters() const { return {only_filled_, no_measurement_}; }
@@ -83,10 +84,13 @@ class CloudMapping {
   std::string frame_;
   std::optional<CloudMap> map_;
   std::map<ViewName, View> views_;
-  std::uint64_t looks_ = 0;     // clouds that are in the map, be it in part
-  std::vector<float> numbers_;  // of the view that is inserted
-  std::mutex mutex_;            // of pinholes_
-  std::vector<std::optional<PinholeView>> pinholes_;
+  StampNs first_ns_ = 0;                            // LoadedMap::first_ns
+  std::uint64_t looks_ = 0;                         // clouds that are in the map, be it in part
+  std::map<std::string, std::uint64_t> placed_by_;  // LoadedMap::placed_by
+  std::vector<float> numbers_;                      // of the view that is inserted
+  std::deque<CameraInfos> camera_infos_;            // by source
+  std::mutex mutex_;                                // of the next one
+  std::vector<MissedClouds> missed_;
   std::atomic<std::uint64_t> only_filled_{0}, no_measurement_{0};
 
   struct Reading;

@@ -51,6 +51,7 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
   for (const std::string& sentence : config.robot.hints) ROS_WARN_STREAM("robot: " << sentence);
   takeRemappings(node, config);
   limitLive(config);
+  config.monitor.own_voxels_beside = config.takesClouds();  // there is always a map on its way: no step waits for one
   return config;
 }
 
@@ -119,10 +120,35 @@ void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShi
   tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 
+/// A trajectory of joints, or a twist of a frame.
+void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
+  const auto hand = [this](const auto& motion) {
+    queue.command([this, motion] {
+      const std::string problem = pipeline.intend(*motion);
+      if (!problem.empty()) log.complain("intended", private_node.resolveName("intended"), problem);
+    });
+  };
+  const std::string topic = private_node.resolveName("intended");
+  try {
+    if (message->getDataType() == ros::message_traits::datatype<trajectory_msgs::JointTrajectory>()) {
+      hand(message->instantiate<trajectory_msgs::JointTrajectory>());
+    } else if (message->getDataType() == ros::message_traits::datatype<geometry_msgs::TwistStamped>()) {
+      hand(message->instantiate<geometry_msgs::TwistStamped>());
+    } else {
+      const std::string type = message->getDataType();
+      queue.command([this, topic, type] {
+        log.complain("intended", topic, "has type " + type + "; it takes JointTrajectory and TwistStamped");
+      });
+    }
+  } catch (const std::exception& error) {
+    tellLost(topic, error);
+  }
+}
+
 void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {
   const std::int64_t now_ns = steadyNs();
   state.mapCame(now_ns);
-  if (map_drops.mayLack(map_callbacks)) maps->lose();
+  if (map_drops.mayLack(map_callbacks)) maps->lose(source);
   map_publisher_seen = true;
   const auto receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   const auto refuse = [&](const std::string& problem) { maps->refuse(source, problem, receipt_ns, now_ns); };
@@ -133,7 +159,7 @@ void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try 
   if (needsCameraInfo(message.datatype)) listenToCameraInfo(source);
   maps->submit({source, std::move(message.datatype), std::move(message.bytes), receipt_ns}, now_ns);
 } catch (const std::exception& error) {
-  maps->lose();
+  maps->lose(source);
   tellLost(config.liveMapNames()[source], error);
 }
 
@@ -146,8 +172,12 @@ void CollisionMonitor::Impl::listenToCameraInfo(std::size_t source) {
   camera_info_subscribers[source] = input.subscribe<ShapeShifter>(
       topic, SUBSCRIBER_QUEUE, [this, source, topic](const ShapeShifter::ConstPtr& message) {
         try {
-          maps->setCameraInfo(source, cameraInfoProblem(message->getDataType(), message->getMD5Sum()),
-                              bytesOf(*message));
+          const std::string why_void = maps->setCameraInfo(
+              source, cameraInfoProblem(message->getDataType(), message->getMD5Sum()), bytesOf(*message));
+          if (why_void.empty()) return;
+          const std::int64_t now_ns = steadyNs();
+          state.mapCame(now_ns);
+          maps->refuse(source, why_void, static_cast<StampNs>(ros::Time::now().toNSec()), now_ns);
         } catch (const std::exception& error) {
           tellLost(topic, error);
         }
@@ -176,6 +206,12 @@ void CollisionMonitor::Impl::subscribe() {
     options.transport_hints = ros::TransportHints().tcpNoDelay();
     return input.subscribe(options);
   };
+  if (config.intent) {
+    ros::NodeHandle motion(private_node);
+    motion.setCallbackQueue(&input_callbacks);
+    intended_subscriber = motion.subscribe<ShapeShifter>(
+        "intended", SUBSCRIBER_QUEUE, [this](const ShapeShifter::ConstPtr& message) { onIntended(message); });
+  }
   tf_subscriber = listenTo("/tf", false);
   tf_static_subscriber = listenTo("/tf_static", true);
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());

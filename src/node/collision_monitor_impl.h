@@ -62,7 +62,7 @@ struct CollisionMonitor::Impl {
   std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
   std::vector<ros::Subscriber> map_subscribers;                    // of the octomap, or one for each source of clouds
   std::map<std::size_t, ros::Subscriber> camera_info_subscribers;  // of depth pictures, by their source
-  ros::Subscriber tf_subscriber, tf_static_subscriber;
+  ros::Subscriber tf_subscriber, tf_static_subscriber, intended_subscriber;
   std::unique_ptr<MasterWatch> master;
   std::vector<ros::ServiceServer> services;
   std::unique_ptr<Reconfigure> reconfigure;
@@ -77,6 +77,7 @@ struct CollisionMonitor::Impl {
   DropWatch map_drops;                    // the maps' thread's; of clouds one that is dropped is in no map
   std::vector<std::uint64_t> mesh_lacks;  // by body, messages that are taken for missing
   bool plan_unsaid = false;               // the worker's
+  std::vector<std::string> said_effects;  // in the log; the worker's
   StampNs newest_ns = 0;                  // stamp of the last outcome; the worker's
   std::uint64_t steps_unpublished = 0;    // the worker's, too
 
@@ -101,6 +102,7 @@ struct CollisionMonitor::Impl {
   void onMeshNumber(std::size_t body, std::uint64_t number);
   void onMesh(std::size_t body, MeshMessage message);
   void onTransforms(const ros::MessageEvent<const topic_tools::ShapeShifter>& event, bool is_static);
+  void onIntended(const topic_tools::ShapeShifter::ConstPtr& message);
   void onMap(std::size_t source, RawMessage& message);  ///< of the maps' thread, as what follows
   void listenToCameraInfo(std::size_t source);
 

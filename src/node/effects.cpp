@@ -70,12 +70,10 @@ bool EffectTracker::decide(MonitorOptions& options) const {
   return std::exchange(options.detector.clearance.wanted, distances) != distances || other_map;
 }
 
-void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {
+void EffectTracker::learn(const Outcome& outcome) {
   if (!outcome.answered) return;
-  bool changed = scene_.left_out_pairs != monitor.leftOut().size();
-  scene_.left_out_pairs = monitor.leftOut().size();
   const bool has_map = outcome.obstacle != nullptr;
-  changed = std::exchange(scene_.map_used, has_map) != has_map || changed;
+  bool changed = std::exchange(scene_.map_used, has_map) != has_map;
   for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
     const auto& topology = outcome.step->bodies[b].topology;
     std::shared_ptr<const Topology>& known = scene_.bodies[b].topology;

@@ -34,7 +34,7 @@ class EffectTracker {
   /// Sets what the plan decides of a monitor's options. False: they are so already.
   bool decide(MonitorOptions& options) const;
   /// Learns topologies, whether there is a map and what is left out from the outcome.
-  void learn(const Outcome& outcome, const Monitor& monitor);
+  void learn(const Outcome& outcome);
   /// True when the plan has changed since the last call, or at the first one.
   bool takeNewPlan();
 

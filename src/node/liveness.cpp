@@ -25,6 +25,8 @@ std::string waitsTooLong(double answer_timeout_s) {
   return "a newer map came and has not been in use for more than " + seconds(answer_timeout_s);
 }
 
+std::string noFrameFor(double max_step_s) { return "no frame has come for more than " + seconds(max_step_s); }
+
 void Liveness::frame(std::int64_t name, std::int64_t now_ns) {
   newest_ = {name, now_ns};
   if (open_.size() < MAX_OPEN) open_.push_back(newest_);
@@ -89,7 +91,7 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
     add(Fault::Kind::NO_ANSWER, "a frame has had no answer for more than " + seconds(limits_.answer_timeout_s));
   }
   if (newest_.came_ns != NEVER && secondsBetween(newest_.came_ns, now_ns) > limits_.max_step_s) {
-    add(Fault::Kind::SILENCE, "no frame has come for more than " + seconds(limits_.max_step_s));
+    add(Fault::Kind::SILENCE, noFrameFor(limits_.max_step_s));
   }
   if (lacked_map_ || lacksMap()) {
     add(Fault::Kind::NEWER_MAP,

@@ -24,6 +24,7 @@ struct Fault {
   std::string sentence;
 };
 
+std::string noFrameFor(double max_step_s);
 /// Of a newer map that has had that long to be in use [s].
 std::string waitsTooLong(double answer_timeout_s);
 

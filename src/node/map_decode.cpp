@@ -26,6 +26,7 @@ OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std
   OctomapLimits limits;
   limits.max_bytes = largestMapMessage(config);
   limits.free_leaves = config.needsKnownSpace();
+  limits.log_odds = config.ownsVoxels();
   if (!memory) return limits;
   limits.max_leaves = std::numeric_limits<std::size_t>::max();
   limits.accept = [&unknown, memory](const OctomapCounts& counts) { unknown = memory->accept(counts); };
@@ -45,7 +46,8 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
     known.assign(decoded.occupied.begin(), decoded.occupied.end());
     known.insert(known.end(), decoded.free.begin(), decoded.free.end());
     std::vector<OccupiedLeaf>().swap(decoded.free);
-    map.known = counted(KnownSpace::build(decoded.resolution_m, known));
+    map.known = counted(decoded.found ? KnownSpace::build(decoded.resolution_m, known, *std::move(decoded.found))
+                                      : KnownSpace::build(decoded.resolution_m, known));
   }
   if (config.unknown_space == UnknownSpace::OCCUPIED) {
     const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, max_unknown);
@@ -100,7 +102,7 @@ std::string whyRefused(const std::string& problem, const MonitorConfig& config) 
 }
 
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config, const MapMemory* memory,
-                           const VoxelSurface* before) {
+                           const VoxelSurface* before, MapOdds* odds) {
   LoadedMap map;
   loadMap(config, memory, before, map, [&](const OctomapLimits& limits) {
     WireReader wire(bytes.data(), bytes.size());
@@ -114,7 +116,9 @@ LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const Monitor
     const WireSpan<std::uint8_t> data = wire.readArray<std::uint8_t>("data");
     fields.data = data.data;
     fields.size = data.size;
-    return decodeOctomap(fields, limits);
+    DecodedOctomap decoded = decodeOctomap(fields, limits);
+    if (odds) decoded.found = odds->foundIn(decoded, map.frame_id, map.stamp_ns);
+    return decoded;
   });
   return map;
 }

@@ -17,6 +17,8 @@ constexpr std::chrono::milliseconds POLL{2};  // of tf, where a cloud waits for 
 // and take a share of max_map_mb each at the most. Else the newest alone counts.
 constexpr std::size_t MOST_FINISHED = 4, SHARE_OF_FINISHED = 32;
 
+const char* const GAVE_WAY = "too many came, and it gave way to a newer one";
+
 constexpr std::size_t MOST_WAITING = 64;  // views: a publisher may make up a frame_id for each cloud
 
 }  // namespace
@@ -61,6 +63,9 @@ void MapLoader::put(Job job) {
       jobs_.push_back(std::move(job));
     } else {
       ++dropped_;
+      if (config_.takesClouds() && frame_known_) {  // before, no map has begun
+        clouds_.miss(waiting->message.source, waiting->problem.empty() ? GAVE_WAY : waiting->problem);
+      }
       job.since_ns = waiting->since_ns;
       job.message.is_behind = true;
       *waiting = std::move(job);
@@ -69,7 +74,8 @@ void MapLoader::put(Job job) {
   changed_.notify_one();
 }
 
-void MapLoader::lose() {
+void MapLoader::lose(std::size_t source) {
+  if (config_.takesClouds()) clouds_.miss(source, "it may have come, and was lost before it was taken");
   const std::lock_guard<std::mutex> lock(mutex_);
   ++number_;
 }
@@ -120,7 +126,7 @@ LoadedMap MapLoader::load(const Job& job) {
     return clouds_.add(
         job.message, [&] { return mayWait(job); }, last_.get());
   }
-  if (job.problem.empty()) return decodeMapMessage(job.message.bytes, config_, &memory_, last_.get());
+  if (job.problem.empty()) return decodeMapMessage(job.message.bytes, config_, &memory_, last_.get(), &odds_);
   if (config_.takesClouds()) clouds_.refuse(job.message.source, job.message.receipt_ns, job.problem);
   LoadedMap refused;
   refused.problem = job.problem;

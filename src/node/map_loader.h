@@ -16,6 +16,7 @@
 #include "node/cloud_mapping.h"
 #include "node/map_memory.h"
 #include "node/monitor_pipeline.h"
+#include "octomap/map_odds.h"
 
 namespace dccd {
 
@@ -27,9 +28,10 @@ std::string mapMessageProblem(const std::string& datatype, const std::string& md
 std::string whyRefused(const std::string& problem, const MonitorConfig& config);
 /// A serialised octomap_msgs/Octomap to a map; never throws: what is wrong is in LoadedMap::problem.
 /// `memory`: what it must fit in; null: no limit but that of the message. `before`: of an older map, or null; the same
-/// map is then made faster.
+/// map is then made faster. `odds`: of the maps before, or null: nobody is told what they found.
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config,
-                           const MapMemory* memory = nullptr, const VoxelSurface* before = nullptr);
+                           const MapMemory* memory = nullptr, const VoxelSurface* before = nullptr,
+                           MapOdds* odds = nullptr);
 /// A .bt or .ot file. Never throws.
 LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, const MapMemory* memory = nullptr);
 
@@ -45,14 +47,14 @@ class MapLoader {
   /// clock; replaces one of the same view that still waits. From any thread.
   void submit(CloudMessage message, std::int64_t arrival_ns);
   void submitFile(const std::string& file, std::int64_t arrival_ns);
-  /// One came, or may have, of which there is nothing. From any thread.
-  void lose();
+  /// One of the source came, or may have, of which there is nothing. From any thread.
+  void lose(std::size_t source = 0);
   /// A message of a source that is refused undecoded takes its turn all the same: it is newer than the map in use,
   /// which is void with it. From any thread.
   void refuse(std::size_t source, const std::string& problem, StampNs receipt_ns, std::int64_t arrival_ns);
   /// As CloudMapping::setCameraInfo(). From any thread.
-  void setCameraInfo(std::size_t source, const std::string& problem, const std::vector<std::uint8_t>& bytes) {
-    clouds_.setCameraInfo(source, problem, bytes);
+  std::string setCameraInfo(std::size_t source, const std::string& problem, const std::vector<std::uint8_t>& bytes) {
+    return clouds_.setCameraInfo(source, problem, bytes);
   }
   /// A cloud waits until the fixed frame is known. From any thread.
   void setFixedFrame(const std::string& frame);
@@ -84,6 +86,7 @@ class MapLoader {
   const MapMemory memory_{config_};
   CloudMapping clouds_;
   std::shared_ptr<const VoxelSurface> last_;  // of the newest map, if that was not refused; the thread's
+  MapOdds odds_;                              // the same
   std::function<void()> ready_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -40,6 +40,8 @@ std::size_t MapMemory::accept(const OctomapCounts& counts) const {
   const Need need = needOf(counts, config_.needsKnownSpace());
   // The map in use and the one that follows. Where steps leave voxels out, also what remains of each of them.
   std::size_t least = need.most + 2 * need.kept;
+  // Log-odds of this map and of the one before, and where it found something.
+  if (config_.ownsVoxels()) least += counts.occupied * (3 * MAP_LEAF_LISTED + 2 * sizeof(float));
   const bool excludes = !config_.monitor.detector.exclude_boxes.empty();
   for (int copies = excludes + config_.ownsVoxels(); copies > 0; --copies) {
     least += built(counts.occupied, counts.occupied_nodes) + need.kept + MAX_ADDED_LEAVES * MAP_LEAF_ADDED;

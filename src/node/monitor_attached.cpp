@@ -1,5 +1,6 @@
 // What the robot's hand holds: bodies whose contacts with it are expected, and objects that come and go as bodies.
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "node/monitor_pipeline.h"
@@ -9,13 +10,6 @@ namespace {
 
 // More than a hand holds and leaves about: each costs a little in every step.
 constexpr std::size_t MOST_ATTACHED = 64;
-
-/// What meets nothing, in the place of an object that is not there.
-Body nobody() {
-  Body body;
-  body.self_collision = body.against_bodies = body.against_obstacle = false;
-  return body;
-}
 
 bool isOff(const MonitorConfig& config, Effect effect) {
   return settingOf(config.effects, effect) == EffectSetting::OFF;
@@ -50,7 +44,7 @@ void MonitorPipeline::attach(AttachedObject object) {
   // Where nobody had own voxels at the start, maps do not tell what is needed for it.
   if (config_.ownsVoxels()) body.own_voxels_m = config_.robot.named ? robot.own_voxels_m : config_.own_voxels_m;
   for (std::size_t b = 0; b < first + count && !robot.against_links; ++b) {
-    if (b >= first ? b != first + number : !config_.bodies[b].link.empty()) {
+    if (b >= first ? b != first + number : !config_.bodies[b].body.link.empty()) {
       body.not_against.push_back(static_cast<std::uint16_t>(b));
     }
   }
@@ -74,16 +68,12 @@ void MonitorPipeline::detach(const std::string& name) {
   const std::size_t number = attachedNumber(name);
   const bool is_held = number < attached_.size() && attached_[number]->held;
   if (!is_held) throw ParameterError("object '" + name + "' is not attached");
-  Rigid& rigid = *rigid_[config_.bodies.size() + number];
-  Eigen::Isometry3d pose;
-  std::string reason = "the fixed frame is not known before the clock body's first message";
-  if (fixed_frame_.empty() || !transforms_.lookup(fixed_frame_, rigid.frame, 0, pose, reason)) {
-    throw ParameterError("object '" + name + "' stays attached, for it is not known where it is let go: " + reason);
+  if (!checked_[config_.monitor.clock_body]) {
+    throw ParameterError("object '" + name + "' stays attached: no frame of the clock body has come yet");
   }
-  rigid.frame_from_mesh = pose * rigid.frame_from_mesh;
-  rigid.frame = fixed_frame_;
-  attached_[number]->held = false;
   voidWhatWasSaid("object '" + name + "' was detached");
+  attached_[number]->held = false;
+  rigid_[config_.bodies.size() + number]->let_go_ns = changedAt(newest_ns_);
   expectNow(config_.phase);
 }
 
@@ -94,9 +84,11 @@ void MonitorPipeline::remove(const std::string& name) {
   voidWhatWasSaid("object '" + name + "' was removed");
   attached_[number].reset();
   expectNow(config_.phase);  // before the body that is expected is gone
+  Body nobody;               // in its place
+  nobody.self_collision = nobody.against_bodies = nobody.against_obstacle = false;
   Rigid none;
   none.mesh.topology = NOTHING;
-  setBody(config_.bodies.size() + number, nobody(), std::move(none));
+  setBody(config_.bodies.size() + number, nobody, std::move(none));
 }
 
 void MonitorPipeline::setHold(const std::string& body, const std::string& by, bool closed) {

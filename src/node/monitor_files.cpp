@@ -78,7 +78,8 @@ void MonitorPipeline::loadFiles() {
                                        [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     addGroups(mesh, body.mesh_file, setsNamed(b), body);
     file_hints_[b] = hintsOf(body.mesh_file, mesh);
-    hints_[b] = joined(file_hints_[b], rigidHint(body.mesh_file, mesh.positions, body.mesh_scale));
+    doubts_[b] = rigidDoubt(body.mesh_file, mesh.positions, body.mesh_scale);
+    hints_[b] = joined(file_hints_[b], doubts_[b]);
     setRigid(b, mesh);
   }
 }
@@ -97,7 +98,7 @@ void MonitorPipeline::setRigid(std::size_t body, const MeshResource& mesh) {
   Rigid& rigid = rigid_[body].emplace(rigidOf(mesh));
   rigid.name = config.body.name;
   rigid.frame = config.tf_frame;
-  rigid.may_be_lost = !config.link.empty();
+  rigid.may_be_lost = !config.body.link.empty();
   const double radius_m = config.input.noise_radius_m;
   if (radius_m > 0) rigid.mesh.radius_m.assign(rigid.reference.size(), radius_m);
 }

@@ -1,5 +1,7 @@
 #include "node/monitor_log.h"
 
+#include <utility>
+
 #include <ros/console.h>
 
 #include "input/short_text.h"
@@ -10,8 +12,23 @@ namespace dccd {
 
 namespace {
 
-// A publisher that has not been heard for so long after the start may not be there.
+// A publisher that has not been heard for so long after the start may not be there; what has not come for so long after
+// the first frame may not come.
 constexpr std::int64_t PATIENCE_NS = 3000000000;
+
+/// It lacks what may be on its way when frames begin to come: tf, the map, another body.
+bool lacksWhatMayCome(const Outcome& outcome) {
+  switch (outcome.status) {
+    case StepStatus::NO_TRANSFORM:
+    case StepStatus::NO_MAP:
+    case StepStatus::NO_BODY:
+      return true;
+    case StepStatus::PARTIAL:
+      return outcome.reason.find("no transform") != std::string::npos;
+    default:
+      return false;
+  }
+}
 
 }  // namespace
 
@@ -19,7 +36,10 @@ MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, con
     : node_(node), name_(name), config_(config), map_source_(mapSourceOf(node, config)) {}
 
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
-  const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();
+  complain(kind, body < config_.bodies.size() ? topicOf(body) : mapSource(), text);
+}
+
+void MonitorLog::complain(const std::string& kind, const std::string& topic, const std::string& text) {
   const std::string line = throttle_.line(topic + " " + kind, topic + ": " + shortText(text), steadyNs());
   if (!line.empty()) ROS_WARN_STREAM(line);
 }
@@ -31,10 +51,26 @@ void MonitorLog::alarm(const std::string& kind, const std::string& text) {
 
 bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
-void MonitorLog::tell(const Outcome& outcome, const std::string& hint) {
+bool MonitorLog::isStarting() const {
+  return !has_started_ && (first_ns_ == 0 || steadyNs() - first_ns_ <= PATIENCE_NS);
+}
+
+bool MonitorLog::waits(const std::string& what) {
+  if (!isStarting()) return false;
+  if (!std::exchange(told_waiting_, true)) ROS_INFO_STREAM(name_ << " waits: " << shortText(what));
+  return true;
+}
+
+void MonitorLog::tell(const Outcome& outcome, const Statement& said) {
+  if (first_ns_ == 0) first_ns_ = steadyNs();
+  if (outcome.status == StepStatus::OK && !std::exchange(has_started_, true) && told_waiting_) {
+    ROS_INFO_STREAM(name_ << ": what it waited for has come");
+  }
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
+  if (said.is_doubts_fault) return complain(config_.monitor.clock_body, "doubt", said.doubts.front());
   const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
-                           (hint.empty() ? "" : "; " + hint);
+                           (said.hint.empty() ? "" : "; " + said.hint);
+  if (lacksWhatMayCome(outcome) && waits(text)) return;
   if (outcome.status != StepStatus::TIME_JUMP) {
     return complain(config_.monitor.clock_body, toString(outcome.status), text);
   }
@@ -60,8 +96,15 @@ void MonitorLog::hintAt(std::string silence, const MonitorPipeline& pipeline) {
     const std::string source = body.isRigid() ? "body '" + body.body.name + "'" : topicOf(b);
     text += (text.empty() ? "" : "; ") + source + ": " + hint;
   }
-  if (text.empty()) told_hint_.clear();
-  if (!text.empty() && text != told_hint_ && isDue("hint")) ROS_WARN_STREAM(name_ << ": " << (told_hint_ = text));
+  if (text.empty() && !std::exchange(told_hint_, {}).empty()) ROS_INFO_STREAM(name_ << ": what was missing has come");
+  if (!text.empty() && text != told_hint_ && isDue("hint")) {
+    told_hint_ = text;
+    if (isStarting() && isYetToCome(text)) {
+      ROS_INFO_STREAM(name_ << ": " << text);
+    } else {
+      ROS_WARN_STREAM(name_ << ": " << text);
+    }
+  }
   hint_ = std::move(text);
 }
 

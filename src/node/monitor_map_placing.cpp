@@ -1,5 +1,6 @@
 // Where maps are: each waits for the transform of its frame, in turn.
 #include <algorithm>
+#include <iomanip>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -14,6 +15,8 @@ namespace {
 // As long as tf lags behind maps: a second and a half of a camera's. They take a share of max_map_mb at the most, so
 // that there is room for what follows.
 constexpr std::size_t MOST_UNPLACED = 16, SHARE_OF_UNPLACED = 8;
+
+constexpr double CLOUDS_REACH_M = 10;  // voxels that far from their frame's origin are displaced by a turn of it
 
 ObstacleMap noMap(std::string why) {
   ObstacleMap none;
@@ -75,6 +78,42 @@ std::string MonitorPipeline::doubtOf(const LoadedMap& loaded, const std::string&
   return doubt.empty() ? "" : "where the octomap's frame was at its stamp is not known (" + doubt + ")";
 }
 
+StampNs MonitorPipeline::lookFrom(const FramesAtRest& frames, const std::string& frame, StampNs from_ns) const {
+  return first_cloud_ns_ == 0 || frames.hasLookedAt(frame) ? from_ns : std::min(from_ns, first_cloud_ns_);
+}
+
+/// What earlier clouds showed moves along with it. One that was learnt is looked at with what else is held in it.
+void MonitorPipeline::lookAtCloudsFrame(const std::string& frame, StampNs from_ns, StampNs to_ns) {
+  if (!config_.takesClouds() || config_.octomap_frame.empty() || frame == fixed_frame_) return;
+  const std::string reference = config_.fixed_frame.empty() ? transforms_.rootOf(frame) : fixed_frame_;
+  clouds_frame_ =
+      clouds_frames_.look(tracks_, frame, reference, lookFrom(clouds_frames_, frame, from_ns), to_ns, CLOUDS_REACH_M);
+}
+
+std::string MonitorPipeline::mapPlaceProblem(const Step& step) {
+  const ObstacleMap& map = step.map;
+  if (!map.surface) return {};
+  lookAtCloudsFrame(map.frame_id, step.start_ns, step.stamp_ns);
+  if (clouds_frame_.moved_m > config_.monitor.detector.rigid_tolerance_m) {
+    std::ostringstream text;
+    text << "octomap_frame '" << map.frame_id << "' moved by up to " << std::setprecision(2) << clouds_frame_.moved_m
+         << " m in '" << clouds_frame_.reference
+         << "' since the first cloud; set it to a frame at rest, and restart the monitor";
+    return text.str();
+  }
+  if (!clouds_frame_.unknown.empty()) {
+    return "where octomap_frame '" + map.frame_id + "' was since the first cloud is not known (" +
+           clouds_frame_.unknown + ")";
+  }
+  if (map.arrival_ns <= doubted_map_ns_) return map_doubt_;
+  for (const auto& [frame, since] : clouds_placed_by_) {
+    if (transforms_.staticSince(map.frame_id, frame) <= since) continue;
+    return "the frame '" + frame + "' was sent elsewhere on /tf_static after clouds were placed by it, which stay in " +
+           "the map; restart the monitor";
+  }
+  return {};
+}
+
 /// As far as the newest that has its place, or was refused. Where bodies have own voxels each is looked at in turn,
 /// else the newest alone counts.
 void MonitorPipeline::placeMaps(std::int64_t now_ns) {
@@ -106,6 +145,7 @@ void MonitorPipeline::placeMaps(std::int64_t now_ns) {
     placed_map_.reset();
     if (!is_placed) continue;
     map_placed_ns_ = now_ns;
+    lookAtCloudsFrame(frame, loaded.stamp_ns, loaded.stamp_ns);
     if (config_.fixed_frame.empty()) placed_map_ = std::move(loaded);
   }
   if (unplaced_maps_.empty() || !may_place || !monitor_->map().problem.empty()) return;

@@ -1,11 +1,15 @@
 #include "node/monitor_pipeline.h"
 
 #include <algorithm>
+#include <array>
 #include <new>
+#include <set>
+#include <sstream>
 #include <utility>
 
 #include "input/short_text.h"
 #include "input/transforms.h"
+#include "node/liveness.h"
 #include "output/advice.h"
 
 namespace dccd {
@@ -17,10 +21,13 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, TransformFeed& transforms
       fixed_frame_(config_.fixed_frame) {
   hints_.resize(config_.bodies.size());
   file_hints_.resize(config_.bodies.size());
+  doubts_.resize(config_.bodies.size());
+  map_doubts_.resize(config_.bodies.size());
   loadFiles();
   findSets();
   config_.monitor.detector.expected = config_.expectedIn(config_.phase);
   excluded_ = config_.monitor.detector.excluded;
+  config_.monitor.in_cell = true;
   monitor_ = std::make_unique<Monitor>(config_.monitor, config_.monitorBodies());
   monitor_->setTracks(&tracks_);
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
@@ -33,6 +40,9 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, TransformFeed& transforms
   passed_over_.resize(config_.bodies.size());
   came_.resize(config_.bodies.size());
   sources_.resize(config_.bodies.size());
+  seen_from_.resize(config_.bodies.size());
+  if (config_.intent)
+    motion_.emplace(*config_.intent, config_.robot.description, config_.monitor.detector.rigid_tolerance_m);
 }
 
 void MonitorPipeline::setPhase(const std::string& phase) {
@@ -134,7 +144,8 @@ void MonitorPipeline::keepHint(std::size_t body, const DecodedMesh& mesh, bool i
   const bool others_unread = std::exchange(passed_over_[body].unread, mesh.unread_markers) != mesh.unread_markers;
   passed_over_[body].may_be_things = passed_over_[body].may_be_things || mesh.has_others;
   if (!is_new && !first_wrong && !others_unread) return;
-  hints_[body] = joined(file_hints_[body], meshHint(mesh, config_.bodies[body].input));
+  doubts_[body] = meshDoubt(mesh, config_.bodies[body].input);
+  hints_[body] = joined(joined(file_hints_[body], doubts_[body]), meshHint(mesh));
 }
 
 void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change) {
@@ -151,6 +162,9 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
 
 void MonitorPipeline::voidWhatWasSaid(const std::string& why) {
   promises_.revoke(why);
+  changed_ = why;
+  changed_ns_ = call_ns_;
+  newest_ns_ = sources_[config_.monitor.clock_body].stamp_ns;
   if (voided_.empty()) voided_ = why;  // the first reason: what else changes follows from it
 }
 
@@ -165,6 +179,9 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   }
   if (!map.hint.empty() && map_hints_.insert(map.hint).second) map_hint_ = map.hint;
   map_slow_ = map.slow;
+  if (!map.missed.empty()) missed_clouds_ = std::move(map.missed);
+  if (map.first_ns != 0) first_cloud_ns_ = map.first_ns;
+  if (!map.placed_by.empty()) clouds_placed_by_ = std::move(map.placed_by);
   if (map.surface) map_lead_.add(map.stamp_ns, map.receipt_ns);
   map.is_late = isLate(map.stamp_ns, map_stamp_ns_);
   if (!map.is_late) map_stamp_ns_ = map.stamp_ns;
@@ -190,35 +207,21 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (resting_) monitor_->dropSteps(StepStatus::DISABLED, "the monitor is disabled");
   if (!monitor_->next(now_ns, outcome)) return false;
   if (resting_) return true;
-  effects_.learn(outcome, *monitor_);
+  effects_.learn(outcome);
   frame_answered_ = frame_answered_ || outcome.answered;
-  nameShortcomings(outcome.arrival_ns, outcome);
-  nameWaitingMap(now_ns, outcome);
+  answerForCell(outcome.arrival_ns, now_ns, outcome);
+  doubtFirstMap(outcome);
+  if (outcome.answered) outcome.claim.answer(Question::NEWEST_FRAME, "");  // from now on Liveness watches
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
     promises_.follow(outcome);
+    followIntended(outcome);
   }
-  statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken());
+  statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken(), doubts());
   if (!map_slow_.empty()) {
     statement_.hint = outcome.status == StepStatus::NO_MAP ? map_slow_ : joined(statement_.hint, map_slow_);
   }
   return true;
-}
-
-void MonitorPipeline::nameShortcomings(std::int64_t came_ns, Outcome& outcome) {
-  nameMissing(outcome);
-  nameUnwatched(outcome);
-  nameNewerMap(came_ns, outcome);
-  nameClocks(outcome);
-  if (outcome.answered && !transforms_doubt_.empty()) outcome.unproved.push_back(transforms_doubt_);
-  for (std::size_t b = 0; b < passed_over_.size() && outcome.answered; ++b) {
-    if (!passed_over_[b].may_be_things) continue;
-    outcome.excluded.push_back("other markers on the topic of body '" + config_.bodies[b].body.name + "'");
-  }
-  nameSenders(outcome);
-  nameRenumbered(outcome);
-  if (!outcome.answered || !outcome.step->map.surface || outcome.step->map.arrival_ns > doubted_map_ns_) return;
-  outcome.unproved.push_back(map_doubt_);
 }
 
 double MonitorPipeline::Source::hear(const DecodedMesh& mesh, const MeshMessage& message) {
@@ -235,36 +238,6 @@ void MonitorPipeline::Senders::hear(const std::string& sender) {
   if (sender.empty() || sender == last) return;
   in_turn = in_turn || sender == before;
   before = std::exchange(last, sender);
-}
-
-void MonitorPipeline::nameSenders(Outcome& outcome) const {
-  for (std::size_t b = 0; outcome.answered && b < sources_.size(); ++b) {
-    const Senders& senders = sources_[b].senders;
-    if (!senders.in_turn) continue;
-    outcome.unproved.push_back("frames of body '" + config_.bodies[b].body.name +
-                               "' came in turn from two publishers, " + shortText(senders.before) + " and " +
-                               shortText(senders.last) + ": which of them shows it is not known (~reset forgets both)");
-  }
-}
-
-/// Corners that come apart number the vertices of a triangle soup anew: those that are named by number are others then.
-void MonitorPipeline::nameRenumbered(Outcome& outcome) const {
-  for (std::size_t b = 0; outcome.answered && b < sources_.size(); ++b) {
-    const BodyConfig& body = config_.bodies[b];
-    const auto namesVertices = [&](const Expectation& one) {
-      return std::any_of(one.partners.begin(), one.partners.end(), [&](const ExpectedPartner& partner) {
-        return partner.body == b && !partner.vertices.empty();
-      });
-    };
-    const std::vector<Expectation>& expected = config_.monitor.detector.expected;
-    const bool is_named =
-        !body.body.vertex_mask.empty() || std::any_of(expected.begin(), expected.end(), namesVertices);
-    if (!sources_[b].is_renumbered || !is_named) continue;
-    outcome.unproved.push_back(
-        "corners of body '" + body.body.name +
-        "' came apart, which numbers its vertices anew, and vertex_mask or expected_contacts names "
-        "them by number; send a mesh with indices, or call ~reset");
-  }
 }
 
 StatsContext MonitorPipeline::counters() const {
@@ -309,14 +282,20 @@ void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   }
   monitor_->reset(status);
   promises_.forget(why);
+  if (motion_) motion_->forget();
+  intended_ = {};
+  answered_ns_ = 0;
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
+  map_doubts_.assign(config_.bodies.size(), std::nullopt);
   for (Source& source : sources_) source.lead = {}, source.senders = {}, source.is_renumbered = false;
   map_lead_ = {};
+  missed_before_.clear();
+  for (const MissedClouds& missed : missed_clouds_) missed_before_.push_back(missed.count);
   learnAnew(status);
 }
 
-Outcome MonitorPipeline::checkNow() {
+Outcome MonitorPipeline::checkNow(std::int64_t now_ns) {
   Outcome outcome;
   if (const std::size_t body = misplaced(); body < waiting_.size()) {
     outcome.status = StepStatus::NO_BODY;
@@ -324,7 +303,10 @@ Outcome MonitorPipeline::checkNow() {
     return outcome;
   }
   outcome = monitor_->checkNow();
-  nameShortcomings(std::numeric_limits<std::int64_t>::max(), outcome);
+  answerForCell(now_ns, now_ns, outcome);
+  if (!outcome.answered) return outcome;
+  const double silent_s = secondsBetween(outcome.arrival_ns, now_ns), most_s = config_.monitor.store.max_step_s;
+  outcome.claim.answer(Question::NEWEST_FRAME, silent_s > most_s ? noFrameFor(most_s) : "");
   return outcome;
 }
 
@@ -332,6 +314,102 @@ std::string MonitorPipeline::onlyPassedOver(std::size_t body) const {
   const OtherMarkers& others = passed_over_[body];
   if (checked_[body] || others.messages == 0) return {};
   return "all messages so far, " + std::to_string(others.messages) + ", are passed over: " + others.newest;
+}
+
+std::vector<SpeedBound> MonitorPipeline::speedBounds() const {
+  std::vector<SpeedBound> bounds = config_.speedBounds(monitor_->bodies().size());
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
+    if (rigid_[b] && !fixed_frame_.empty() && rigid_[b]->frame == fixed_frame_) bounds[b].max_m_s = 0;
+  }
+  return bounds;
+}
+
+std::vector<CarriedBody> MonitorPipeline::carriedBodies() const {
+  std::vector<CarriedBody> carried;
+  for (std::size_t b = 0; b < rigid_.size(); ++b) {
+    if (!rigid_[b] || rigid_[b]->isNone() || rigid_[b]->frame == fixed_frame_ || rigid_[b]->let_go_ns != NEVER)
+      continue;
+    CarriedBody& one = carried.emplace_back();
+    one.body = static_cast<std::uint16_t>(b);
+    one.frame = rigid_[b]->frame;
+    one.frame_from_body = rigid_[b]->frame_from_mesh;
+    for (const Vec3& p : rigid_[b]->reference) one.reach_m = std::max(one.reach_m, p.norm());
+  }
+  return carried;
+}
+
+/// Whatever it throws, what the bounds alone allow has been said.
+void MonitorPipeline::followIntended(const Outcome& outcome) try {
+  intended_ = {};
+  intended_.along.unused = "no path is in force";
+  if (!motion_ || !outcome.answered) return;
+  answered_ns_ = outcome.stamp_ns;
+  const auto lookup = [this](const std::string& frame, StampNs stamp_ns) -> std::optional<Eigen::Isometry3d> {
+    Eigen::Isometry3d fixed_from_frame = Eigen::Isometry3d::Identity();
+    std::string reason;
+    if (!transforms_.lookup(fixed_frame_, frame, stamp_ns, fixed_from_frame, reason)) return std::nullopt;
+    return fixed_from_frame;
+  };
+  const std::optional<IntendedPath> path = motion_->from(*outcome.step, carriedBodies(), lookup);
+  if (!path) return;
+  const Options& options = monitor_->options().detector;
+  intended_.path = *path;
+  // What is published waits for it.
+  const Deadline deadline = Deadline::after(tolerance::LOOK_AHEAD_SHARE * timeLimitMs(options));
+  intended_.along = path_search_.run(outcome, options, speedBounds(), config_.speed_law, *path, deadline);
+  if (!intended_.along.rests_on_path) return;
+  // Whether it was, the next answer tells.
+  const auto why_void = [path = beginningAt(*path, *outcome.step), stamp_ns = outcome.stamp_ns](const Outcome& next) {
+    const double ahead_s = secondsBetween(stamp_ns, next.stamp_ns);
+    const PlaceOnPath place = placeOnPath(path, *next.step, 0, ahead_s);
+    if (place.off_m <= path.tubeAt(ahead_s)) return std::string();
+    std::ostringstream text;
+    text << "the robot was " << place.off_m << " m off the intended path, and " << path.tubeAt(ahead_s)
+         << " m are allowed";
+    return text.str();
+  };
+  promises_.extend(outcome, intended_.along.until, why_void);
+} catch (const std::exception& error) {
+  intended_ = {};
+  intended_.along.unused = std::string("a fault of the monitor: ") + error.what();
+}
+
+SpeedScale MonitorPipeline::speedScale(const Outcome& outcome) const {
+  if (!config_.speed_law) return {};
+  if (intended_.along.unused.empty()) return intended_.along.scale;
+  return dccd::speedScale(outcome, speedBounds(), *config_.speed_law);
+}
+
+void MonitorPipeline::doubtFirstMap(const Outcome& outcome) {
+  if (!outcome.answered || !outcome.obstacle || !outcome.start_state_complete) return;
+  for (std::size_t b = 0; b < map_doubts_.size(); ++b) {
+    const Body& body = outcome.step->bodies[b];
+    if (map_doubts_[b] || !meetsMap(body)) continue;
+    std::string& doubt = map_doubts_[b].emplace();
+    // Own voxels are looked for already, or cannot be.
+    if (ownsVoxels(body) || config_.unknown_space == UnknownSpace::OCCUPIED) continue;
+    std::set<Index> occupied;
+    for (const StartIntersection& one : outcome.intersections) {
+      if (one.body == std::array<std::uint16_t, 2>{static_cast<std::uint16_t>(b), OBSTACLE_BODY}) {
+        occupied.insert(one.vertex[0]);
+      }
+    }
+    if (occupied.empty() || 2 * occupied.size() < body.topology->vertexCount()) continue;
+    doubt = "the map was occupied where '" + body.name + "' was: does it hold '" + body.name +
+            "' itself? Then set own_voxels_m: auto";
+  }
+}
+
+std::vector<std::string> MonitorPipeline::doubts() const {
+  std::vector<std::string> sentences;
+  for (const auto& doubt : map_doubts_) {
+    if (doubt && !doubt->empty()) sentences.push_back(*doubt);
+  }
+  for (std::size_t b = 0; b < doubts_.size(); ++b) {
+    if (!doubts_[b].empty()) sentences.push_back("body '" + config_.bodies[b].body.name + "': " + doubts_[b]);
+  }
+  sentences.insert(sentences.end(), config_.robot.doubts.begin(), config_.robot.doubts.end());
+  return sentences;
 }
 
 std::string MonitorPipeline::takeProblem(std::size_t body) { return std::exchange(problems_[body], {}); }

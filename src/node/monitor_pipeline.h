@@ -21,17 +21,29 @@
 #include "input/transform_tracks.h"
 #include "node/attach_request.h"
 #include "node/effects.h"
+#include "node/frames_at_rest.h"
+#include "node/intended_motion.h"
 #include "output/output_messages.h"
 
 namespace dccd {
 
+/// Clouds of one source that came and are not in the map, or in part: the octree is as if the sensor had not looked.
+struct MissedClouds {
+  std::uint64_t count = 0;
+  std::string newest{};  ///< why it is not
+};
+
 /// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
 /// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
 struct LoadedMap : ObstacleMap {
-  std::string hint;        ///< what looks like a mistake in what it was made of; empty: nothing does
-  std::string slow;        ///< that its making takes too long, and what to do; empty: it does not
-  StampNs receipt_ns = 0;  ///< when what it was made of came, by the clock of stamps; 0: nobody knows
-  bool is_late = false;    ///< a map with a later stamp came before it
+  std::string hint;                    ///< what looks like a mistake in what it was made of; empty: nothing does
+  std::string slow;                    ///< that its making takes too long, and what to do; empty: it does not
+  StampNs receipt_ns = 0;              ///< when what it was made of came, by the clock of stamps; 0: nobody knows
+  bool is_late = false;                ///< a map with a later stamp came before it
+  std::vector<MissedClouds> missed{};  ///< by MonitorConfig::clouds, since the start; empty: it does not tell
+  StampNs first_ns = 0;                ///< the earliest stamp of the clouds that it is made of; 0: of none
+  /// Of the clouds that it is made of: the frames by which they were placed, and TransformFeed::staticSince() then.
+  std::map<std::string, std::uint64_t> placed_by{};
 };
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
@@ -82,8 +94,8 @@ class MonitorPipeline {
   /// and a fixed frame that was learnt is learnt anew: from the clock body's next message. `why`: what is said of the
   /// promise that is forgotten.
   void reset(StepStatus status, const std::string& why = {});
-  /// Monitor::checkNow(), with the reason why a static body has no place yet.
-  Outcome checkNow();
+  /// Monitor::checkNow(), with the reason why a static body has no place yet. `now_ns`: on the clock of arrivals.
+  Outcome checkNow(std::int64_t now_ns);
 
   /// Changes what can be changed while it runs. `change` is called twice, with a copy and, once all of it holds, with
   /// the options themselves, of which it writes nothing but what it changes. Throws std::invalid_argument naming the
@@ -99,7 +111,7 @@ class MonitorPipeline {
   /// From the next step on the object is a body that moves with its link. Throws std::invalid_argument or
   /// ParameterError naming the object; all then stays. So do the next two.
   void attach(AttachedObject object);
-  /// It stays where its link's newest transform has it.
+  /// It stays where its link has it at the moment of the call, once tf has come so far.
   void detach(const std::string& name);
   void remove(const std::string& name);
 
@@ -122,13 +134,30 @@ class MonitorPipeline {
   /// What the last outcome promises, and what became of the promise before; nothing where the configuration has no
   /// bounds.
   const PromiseWatch& promises() const { return promises_; }
+  /// What calls change from now on, they change at this stamp: steps that began before prove nothing. 0: nobody knows
+  /// it, and they change it at the newest one that had come.
+  void callsComeAt(StampNs stamp_ns) { call_ns_ = stamp_ns; }
   /// Why what was said of the last outcome is void, since the last call: a call has changed what it rests on. Empty: it
   /// stands.
   std::string takeVoided() { return std::exchange(voided_, {}); }
+  /// What a controller says that the robot is to do, from the next step on. Returns what is wrong with it, a clause;
+  /// empty: it holds. Where nobody listens to it nothing happens.
+  std::string intend(const trajectory_msgs::JointTrajectory& message) { return intendAny(message); }
+  std::string intend(const geometry_msgs::TwistStamped& message) { return intendAny(message); }
+  /// What follows from it for the last outcome.
+  struct Intended {
+    IntendedPath path;
+    AlongPath along;
+  };
+  const Intended& intended() const { return intended_; }
+  /// Why what was intended does not hold any more, since the last call; for the log. Empty: it does.
+  std::string takeIntendedProblem() { return motion_ ? motion_->takeProblem() : std::string(); }
+  /// How fast what slows down may go after this outcome, the last one.
+  SpeedScale speedScale(const Outcome& outcome) const;
   /// What may be said of the last outcome.
   const Statement& statement() const { return statement_; }
-  /// How fast bodies are assumed to be, by body.
-  std::vector<SpeedBound> speedBounds() const { return config_.speedBounds(monitor_->bodies().size()); }
+  /// How fast bodies are assumed to be, by body. A rigid one in the fixed frame stands still.
+  std::vector<SpeedBound> speedBounds() const;
   /// What it has counted so far; the rest of the context is its owner's.
   StatsContext counters() const;
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
@@ -140,8 +169,10 @@ class MonitorPipeline {
   std::string onlyPassedOver(std::size_t body) const;
   /// What was taken for granted to place the map, since the last call; for the log. Empty: nothing was.
   std::string takeMapHint() { return std::exchange(map_hint_, {}); }
-  /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h); empty: nothing
-  /// does.
+  /// Why what is looked at may not be what it is taken for (advice.h), a sentence each.
+  std::vector<std::string> doubts() const;
+  /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h), its doubt
+  /// included; empty: nothing does.
   const std::string& hint(std::size_t body) const { return hints_[body]; }
 
  private:
@@ -153,6 +184,7 @@ class MonitorPipeline {
     bool told = false;     // the problem about it has been set
     std::string reason;    // why it has no place yet
   };
+  static constexpr StampNs NEVER = std::numeric_limits<StampNs>::max();
   /// What tf carries.
   struct Rigid {
     MeshFrame mesh;       // as its file has it, but for
@@ -162,6 +194,8 @@ class MonitorPipeline {
     bool may_be_lost = false;               // others go on without it
     bool lost = false;                      // it had no transform at the last frame
     std::optional<Eigen::Isometry3d> pose;  // the last one
+    StampNs let_go_ns = NEVER;              // from then on it stays where the frame had it
+    std::string doubt;                      // why it may be elsewhere at all times, in words; empty: nothing says so
     bool isNone() const { return reference.empty(); }
   };
   struct Attached {
@@ -179,7 +213,14 @@ class MonitorPipeline {
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
   PromiseWatch promises_;
+  std::optional<IntendedMotion> motion_;
+  PathSearch path_search_;
+  Intended intended_;
   std::string voided_;
+  StampNs answered_ns_ = 0;               // of the newest answer
+  StampNs call_ns_ = 0, changed_ns_ = 0;  // the latter of the last call that changed something,
+  StampNs newest_ns_ = 0;                 // and the clock body's newest stamp then
+  std::string changed_;                   // what it did
   Statement statement_;
   std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;         // a static body of which the monitor has a frame
@@ -200,6 +241,14 @@ class MonitorPipeline {
     double hear(const DecodedMesh& mesh, const MeshMessage& message);
   };
   std::vector<Source> sources_;  // per body
+  /// By what the newest cloud of a depth camera was placed in a fixed frame that is named.
+  struct SeenFrom {
+    std::string frame;
+    StampNs stamp_ns = 0;
+    std::uint64_t epoch = 0;  // FrameTracks::epoch()
+    std::string doubt;        // why it may have been elsewhere, in words; once there is one it stays
+  };
+  std::vector<std::optional<SeenFrom>> seen_from_;  // per body
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
   std::vector<std::optional<Rigid>> rigid_;
   std::vector<std::optional<Attached>> attached_;
@@ -207,7 +256,8 @@ class MonitorPipeline {
   std::vector<std::string> robot_changed_;
   std::shared_ptr<const std::vector<OwnVoxel>> counted_voxels_;  // of a map: robots_voxels_ are the robot's
   std::size_t robots_voxels_ = 0;
-  std::vector<std::string> problems_, hints_, file_hints_;
+  std::vector<std::string> problems_, hints_, file_hints_, doubts_;
+  std::vector<std::optional<std::string>> map_doubts_;  // of the first step with a map; empty: there is none
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   struct UnplacedMap {
@@ -226,10 +276,17 @@ class MonitorPipeline {
   StampNs map_stamp_ns_ = std::numeric_limits<StampNs>::min();  // the latest of the maps'
   std::int64_t doubted_map_ns_ = -1;  // arrival of the last one that may lie elsewhere, and why
   std::string map_doubt_;
+  std::map<std::string, std::uint64_t> clouds_placed_by_;  // LoadedMap::placed_by
+  StampNs first_cloud_ns_ = 0;                             // LoadedMap::first_ns
+  std::vector<MissedClouds> missed_clouds_;                // LoadedMap::missed
+  std::vector<std::uint64_t> missed_before_;               // of these the counts at the last ~reset
+  FramesAtRest clouds_frames_;
+  FramesAtRest::Word clouds_frame_;  // of the last look
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;
   std::optional<LoadedMap> placed_map_;
   bool frame_answered_ = false;  // a step was answered in it
+  FramesAtRest learnt_frames_;   // in which something is held, in the roots of their trees
   std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0, points_no_measurement_ = 0;
   bool resting_ = false;
   struct OtherMarkers {
@@ -242,7 +299,15 @@ class MonitorPipeline {
   std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;
 
+  template <class Message>
+  std::string intendAny(const Message& message) {
+    return motion_ ? motion_->take(message, answered_ns_) : std::string();
+  }
+  void followIntended(const Outcome& outcome);
+  std::vector<CarriedBody> carriedBodies() const;
   void loadFiles();
+  /// Whether the first map was occupied along a body, of each once: a camera's map may hold the body itself.
+  void doubtFirstMap(const Outcome& outcome);
   void keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new);
   void voidWhatWasSaid(const std::string& why);
   void setRigid(std::size_t body, const MeshResource& mesh);
@@ -270,18 +335,30 @@ class MonitorPipeline {
   bool isHopeless(std::size_t body) const { return !refused_[body].empty() || waiting_[body]->kept; }
   /// Why the body, whose frame waits or was refused, has no place.
   std::string missing(std::size_t body) const;
-  /// All that a step cannot show by itself, also of one that nobody but a service asked for. `came_ns`: arrival of its
-  /// frame; what came up to then had to be used.
-  void nameShortcomings(std::int64_t came_ns, Outcome& outcome);
-  /// Says where stamps are of the clocks of two computers that differ.
-  void nameClocks(Outcome& outcome) const;
+  /// Answers what is asked of a cell (Claim), also of an outcome that nobody but a service asked for. What came up to
+  /// `came_ns`, its frame's arrival, had to be used. How long a map waits is told where `now_ns` is of the clock of
+  /// arrivals; in the node Liveness tells it of ~state.
+  void answerForCell(std::int64_t came_ns, std::int64_t now_ns, Outcome& outcome);
+  std::vector<std::string> robotsProblems(const Step& step);
+  /// Where stamps are of the clocks of two computers that differ.
+  void answerForClocks(const Step& step, Claim& claim) const;
+  /// Where the fixed frame was learnt, why what is held in it may be elsewhere.
+  std::vector<std::string> learntFramesProblems(const Step& step);
+  /// Frames that were learnt in which the map, a static body or what was let go is held.
+  std::set<std::string> learntFramesInUse(const Step& step) const;
+  bool hasLetGo() const;
+  /// Says of an outcome with a map of clouds which of them are not in it.
+  void nameMissedClouds(Outcome& outcome) const;
+  std::string newerMapProblem(std::int64_t came_ns, std::int64_t now_ns, const ObstacleMap& map) const;
+  /// When the last call changed something, by the clock of stamps such as this one.
+  StampNs changedAt(StampNs stamp_ns) const;
+  std::string sendersProblem(std::size_t body) const;
+  std::vector<std::string> transformsProblems();
+  std::string numberingProblem(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
   /// Puts the room beside straight paths into the frame's radii, by max_acceleration_m_s2.
   void widen(std::size_t body, MeshFrame& frame);
-  /// Adds what of the robot should be watched and is not, and that it owns too many voxels.
-  void nameUnwatched(Outcome& outcome);
-  /// Of the links and of what they hold, in the step's map.
   std::size_t robotsVoxels(const Step& step);
   /// False: still waits.
   bool placeFrame(std::size_t body, std::int64_t now_ns);
@@ -289,7 +366,7 @@ class MonitorPipeline {
   /// overdue, links of a robot that have no transform stand in nobody's way any longer.
   bool placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
   /// Where it is at the stamp. False: nobody knows. epoch: of tracks_, as it was before.
-  bool placeOne(const Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame, std::string& reason) const;
+  bool placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame, std::string& reason) const;
   Carrier carrierOf(const std::string& frame, std::uint64_t epoch) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
   /// A body is another one from the next step on.
@@ -302,11 +379,11 @@ class MonitorPipeline {
   bool settleMap(const LoadedMap& loaded, bool may_place, ObstacleMap& map, std::string& reason);
   void placeMaps(std::int64_t now_ns);
   void limitUnplacedMaps();
-  /// Says of a step with a map that one which came up to then has no place yet.
-  void nameNewerMap(std::int64_t came_ns, Outcome& outcome) const;
-  void nameWaitingMap(std::int64_t now_ns, Outcome& outcome) const;
-  void nameSenders(Outcome& outcome) const;
-  void nameRenumbered(Outcome& outcome) const;
+  /// From the first cloud on, or from_ns, where nobody has looked at the frame.
+  StampNs lookFrom(const FramesAtRest& frames, const std::string& frame, StampNs from_ns) const;
+  /// Whether the named frame in which the map of clouds is kept is at rest.
+  void lookAtCloudsFrame(const std::string& frame, StampNs from_ns, StampNs to_ns);
+  std::string mapPlaceProblem(const Step& step);
   std::string doubtOf(const LoadedMap& loaded, const std::string& frame) const;
   /// Tf has the frames at the stamp to which maps and static bodies are held.
   bool knowsHeld(StampNs stamp_ns) const;

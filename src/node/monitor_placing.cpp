@@ -14,36 +14,36 @@
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
-namespace {
-
-// What is stamped later than it comes is stamped by another clock. Two that are kept alike by NTP differ by less; what
-// they differ by is how far things are from where they are taken to be at one time.
-constexpr double MOST_AHEAD_S = 0.25;
-// Where the clock body's stamps are ahead, what is behind them by more than this was not late on its way alone.
-constexpr double MOST_LATE_S = 1;
-
-}  // namespace
-
 Carrier MonitorPipeline::carrierOf(const std::string& frame, std::uint64_t epoch) const {
   return {frame == fixed_frame_ ? std::string() : frame, epoch};
 }
 
-bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame,
+bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame,
                                std::string& reason) const {
   frame = rigid.mesh;
   frame.stamp_ns = stamp_ns;
   if (rigid.isNone()) return true;
+  const StampNs held_ns = std::min(stamp_ns, rigid.let_go_ns);
   frame.carrier = carrierOf(rigid.frame, epoch);
-  if (!transforms_.lookup(fixed_frame_, rigid.frame, stamp_ns, frame.pose, reason)) {
+  if (!transforms_.lookup(fixed_frame_, rigid.frame, held_ns, frame.pose, reason)) {
     // It stays where it was, and all of it is unknown there: unchecked.
     frame.pose = rigid.pose.value_or(Eigen::Isometry3d::Identity());
     frame.positions.assign(rigid.reference.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-    frame.doubt = noTransformAt(stamp_ns);
+    frame.doubt = noTransformAt(held_ns);
     reason = transforms_.noTransform(rigid.frame, "'" + fixed_frame_ + "'", reason) + "; body '" + rigid.name +
              "' is carried by it";
     return false;
   }
   frame.pose = frame.pose * rigid.frame_from_mesh;
+  if (stamp_ns >= rigid.let_go_ns) {  // it stays where it was then
+    rigid.doubt = tracks_.doubtAt(fixed_frame_, rigid.frame, held_ns);
+    if (rigid.doubt.empty()) rigid.doubt = transforms_.doubtNextTo(fixed_frame_, rigid.frame, held_ns);
+    rigid.frame_from_mesh = frame.pose;
+    rigid.frame = fixed_frame_;
+    rigid.let_go_ns = NEVER;
+    frame.carrier = carrierOf(rigid.frame, epoch);
+  }
+  frame.doubt = rigid.doubt;
   frame.positions = transformed(frame.pose, rigid.reference);
   return true;
 }
@@ -117,69 +117,6 @@ std::string MonitorPipeline::missing(std::size_t body) const {
   return waiting_[body]->reason + "; " + name + " waits for it";
 }
 
-void MonitorPipeline::nameMissing(Outcome& outcome) const {
-  if (outcome.status != StepStatus::NO_BODY) return;
-  for (std::size_t b = 0; b < waiting_.size(); ++b) {
-    if (refused_[b].empty() && !(waiting_[b] && waiting_[b]->kept)) continue;
-    outcome.reason = missing(b);
-    return;
-  }
-}
-
-void MonitorPipeline::nameNewerMap(std::int64_t came_ns, Outcome& outcome) const {
-  if (!outcome.answered || !outcome.step->map.surface) return;
-  for (const UnplacedMap& one : unplaced_maps_) {
-    if (one.map.arrival_ns > came_ns) continue;
-    outcome.unproved.push_back("an octomap that came before this frame has no place: no transform of its frame '" +
-                               one.map.frame_id + "' at " + secondsOf(one.map.stamp_ns) +
-                               "; raise transform_timeout_s to what tf lags behind");
-    return;
-  }
-}
-
-/// One that is stamped after the frames is in use once these reach its stamp, and it has its time for that.
-void MonitorPipeline::nameWaitingMap(std::int64_t now_ns, Outcome& outcome) const {
-  const std::optional<std::int64_t> since_ns = monitor_->mapWaitsSince();
-  if (!outcome.answered || !since_ns || secondsBetween(*since_ns, now_ns) <= config_.answer_timeout_s) return;
-  outcome.unproved.push_back(waitsTooLong(config_.answer_timeout_s));
-}
-
-/// Where all stamps are ahead alike, it is the clock here that is behind, and nothing is apart in time.
-void MonitorPipeline::nameClocks(Outcome& outcome) const {
-  const std::optional<double> clock_s = sources_[config_.monitor.clock_body].lead.seconds();
-  if (!outcome.answered || !clock_s) return;
-  const auto look = [&](const std::string& name, double ahead_s) {
-    const bool is_ahead = ahead_s > MOST_AHEAD_S && ahead_s - *clock_s > MOST_AHEAD_S;
-    const bool is_behind = *clock_s > MOST_AHEAD_S && *clock_s - ahead_s > MOST_LATE_S;
-    if (!is_ahead && !is_behind) return;
-    const auto timesOf = [](double lead_s) {
-      std::ostringstream text;
-      text << std::setprecision(3) << std::abs(lead_s) << (lead_s > 0 ? " s later" : " s earlier");
-      return text.str();
-    };
-    outcome.unproved.push_back("stamps of " + name + " are up to " + timesOf(ahead_s) +
-                               " than they come, those of body '" +
-                               config_.bodies[config_.monitor.clock_body].body.name + "' " + timesOf(*clock_s) +
-                               ": clocks of two computers differ; synchronise them");
-  };
-  std::set<std::string> frames = monitor_->heldFrames();
-  for (const std::optional<Rigid>& rigid : rigid_) {
-    if (rigid && !rigid->isNone()) frames.insert(rigid->frame);
-  }
-  for (std::size_t b = 0; b < sources_.size(); ++b) {
-    if (isStatic(b)) continue;
-    if (!sources_[b].frame.empty()) frames.insert(sources_[b].frame);
-    if (const auto ahead_s = sources_[b].lead.seconds()) look("body '" + config_.bodies[b].body.name + "'", *ahead_s);
-  }
-  const bool has_map = outcome.step->map.surface != nullptr;
-  if (const auto ahead_s = map_lead_.seconds(); has_map && ahead_s) look("maps on " + config_.mapName(), *ahead_s);
-  std::set<std::string> told;
-  for (const std::string& frame : frames) {
-    const std::optional<TransformFeed::Ahead> ahead = transforms_.mostAhead(fixed_frame_, frame);
-    if (ahead && told.insert(ahead->frame).second) look("the frame '" + ahead->frame + "'", ahead->seconds);
-  }
-}
-
 std::size_t MonitorPipeline::misplaced() const {
   std::size_t b = 0;
   while (b < waiting_.size() && !(waiting_[b] && placed_[b]) && refused_[b].empty()) ++b;
@@ -248,7 +185,10 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     // that was sent once: what is not sent is not elsewhere. A camera may move, and what it saw is where it was then.
     if (!config_.fixed_frame.empty()) done.mesh.carrier.silence = Silence::STANDS;
     const bool is_sensors = config_.bodies[body].input.source == TopologySource::DEPTH_IMAGE;
-    if (is_sensors && !config_.fixed_frame.empty()) done.mesh.carrier.frame.clear();
+    if (is_sensors && !config_.fixed_frame.empty()) {
+      done.mesh.carrier.frame.clear();
+      seen_from_[body] = SeenFrom{done.mesh.frame_id, done.mesh.stamp_ns, epoch, {}};
+    }
     if (config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
   }
   transform(fixed_from_mesh, done.mesh.positions);
@@ -271,6 +211,8 @@ void MonitorPipeline::learnAnew(StepStatus status) {
   if (!config_.fixed_frame.empty()) return;
   trusted_placed_ = false;
   fixed_frame_.clear();
+  // The octree of clouds, and where something was let go, outlast it.
+  if (!config_.takesClouds() && !hasLetGo()) learnt_frames_.forget();
   frame_answered_ = false;
   monitor_->reset(status);
   for (std::size_t b = 0; b < static_meshes_.size(); ++b) {

@@ -8,6 +8,7 @@
 #include <std_srvs/Trigger.h>
 
 #include "input/short_text.h"
+#include "input/steady_clock.h"
 
 namespace dccd {
 namespace {
@@ -32,6 +33,7 @@ ros::ServiceServer advertise(ros::NodeHandle& node, const char* name,
 /// What the call made void is so before its caller hears that it was done.
 Reply CollisionMonitor::Impl::ask(const std::function<Reply()>& run) {
   const auto command = [this, run] {
+    pipeline.callsComeAt(static_cast<StampNs>(ros::Time::now().toNSec()));
     const Reply reply = run();
     publishVoided();
     return reply;
@@ -44,7 +46,7 @@ void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
   using std_srvs::Trigger;
   services.push_back(advertise<Trigger>(service, "check_now", [this](const Trigger::Request&) {
     return ask([this] {
-      const Outcome outcome = pipeline.checkNow();
+      const Outcome outcome = pipeline.checkNow(steadyNs());
       return Reply{outcome.answered, describe(outcome)};
     });
   }));

@@ -57,6 +57,8 @@ void CollisionMonitor::Impl::accountDropped() {
     if (dropped[b] == 0) continue;
     pipeline.monitor().countReceived(b, dropped[b]);
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
+    // Frames pile up while the first ones wait; the cure of a doubt is told alone.
+    if (log.isStarting() || pipeline.statement().is_doubts_fault) continue;
     log.complain(b, "queue",
                  std::to_string(dropped[b]) +
                      " frames dropped: steps take longer than the time between frames, or frames are too large for "
@@ -98,11 +100,24 @@ void CollisionMonitor::Impl::tellStaticFrames() {
 }
 
 void CollisionMonitor::Impl::tellProblems() {
+  std::size_t first_link = config.bodies.size(), links = 0;
+  std::string links_problem;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     const std::string problem = pipeline.takeProblem(b);
     // The clock body's come as outcomes, which are logged when they are published.
-    if (!problem.empty() && b != config.monitor.clock_body) log.complain(b, "message", problem);
+    if (problem.empty() || b == config.monitor.clock_body) continue;
+    const bool may_come = problem.compare(0, 6, "waits:") == 0 || !config.bodies[b].body.link.empty();
+    if (may_come && log.waits(log.topicOf(b) + ": " + problem)) continue;
+    if (config.bodies[b].body.link.empty()) {
+      log.complain(b, "message", problem);
+    } else if (links++ == 0) {
+      first_link = b;
+      links_problem = problem;
+    }
   }
+  // An arm's links are lost together: one line.
+  const std::string more = links > 1 ? "and " + std::to_string(links - 1) + " more of the robot's links: " : "";
+  if (links > 0) log.complain(first_link, "message", more + links_problem);
   const std::string hint = pipeline.takeMapHint();
   if (!hint.empty()) log.complain(config.bodies.size(), "map", hint);
 }
@@ -164,16 +179,24 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
-  log.tell(outcome, pipeline.statement().hint);
+  log.tell(outcome, pipeline.statement());
   newest_ns = outcome.stamp_ns;
   // Once the state is published, roscpp's thread is awake and takes locks that each question for subscribers waits for:
   // results are ready by then. But a long list is not to keep a clear state standing that is over.
   std::function<void()> publish;
   if (outcome.contacts.size() <= SHORT_LIST) publish = outputs.makeResult(outcome, bodies, frame);
   const std::vector<SpeedBound> bounds = pipeline.speedBounds();
-  state.tell(outcome, pipeline.statement(), frame, bounds);
+  state.tell(outcome, pipeline.statement(), frame, pipeline.speedScale(outcome));
   if (config.promises()) {
-    outputs.publishSafeUntil(toSafeUntil(outcome, pipeline.promises(), bounds, ros::Time::now(), frame));
+    deformable_ccd::SafeUntil promise = toSafeUntil(outcome, pipeline.promises(), bounds, ros::Time::now(), frame);
+    if (pipeline.intended().along.rests_on_path)
+      promise.assumed.push_back(assumedOf(outcome, pipeline.intended().path));
+    outputs.publishSafeUntil(promise);
+  }
+  if (config.intent) {
+    outputs.publishAlongPath(toAlongPath(outcome, pipeline.intended().path, pipeline.intended().along, frame));
+    const std::string problem = pipeline.takeIntendedProblem();
+    if (!problem.empty()) log.complain("intended", private_node.resolveName("intended"), problem);
   }
   if (!publish) publish = outputs.makeResult(outcome, bodies, frame);
   publish();
@@ -216,11 +239,16 @@ void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
   }
 }
 
-/// Takes a quarter of a millisecond: after a step, not before it.
+/// Takes a quarter of a millisecond: after a step, not before it. The first step tells most of what decides, and after
+/// that there is little news.
 void CollisionMonitor::Impl::logEffects() {
-  if (!plan_unsaid || !log.isDue("effects")) return;
+  if (!plan_unsaid || log.isStarting() || !log.isDue("effects")) return;
   plan_unsaid = false;
-  for (const std::string& line : pipeline.effects().lines()) ROS_INFO_STREAM(line);
+  std::vector<std::string> lines = pipeline.effects().lines();
+  for (const std::string& line : lines) {
+    if (std::find(said_effects.begin(), said_effects.end(), line) == said_effects.end()) ROS_INFO_STREAM(line);
+  }
+  said_effects = std::move(lines);
 }
 
 void CollisionMonitor::Impl::predict(Outcome& outcome) {

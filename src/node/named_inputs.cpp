@@ -49,7 +49,7 @@ std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config
 std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
   std::string text;
   for (const BodyConfig& body : config.bodies) {
-    if (!body.link.empty()) continue;
+    if (!body.body.link.empty()) continue;
     text += body.body.name + ": ";
     text += body.isRigid() ? "tf frame " + body.tf_frame : node.resolveName(body.topic) + howNamed(body.topic_named);
     text += ", ";

@@ -99,10 +99,10 @@ void StateReporter::setHint(const std::string& hint) {
 }
 
 void StateReporter::tell(const Outcome& outcome, const Statement& statement, const std::string& frame,
-                         const std::vector<SpeedBound>& bounds) {
+                         const SpeedScale& speed) {
   const std::lock_guard<std::mutex> lock(mutex_);
   answer_ = statement;
-  if (law_) speed_told_ = toSpeedScale(outcome, bounds, *law_, frame);
+  if (law_) speed_told_ = toSpeedScale(outcome, speed, frame);
   const ros::Time before = told_.holds_until;
   told_ = toState(outcome, frame);
   // What was answered last stays to be seen; that it is no more proved is said.

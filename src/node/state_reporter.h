@@ -59,9 +59,8 @@ class StateReporter {
   void staticCame(const std::string& body, std::uint64_t number);
   /// The one of this number is in use from the next step on.
   void staticInUse(const std::string& body, std::uint64_t number);
-  /// A step's answer, or why there is none. `bounds`: for ~speed_scale.
-  void tell(const Outcome& outcome, const Statement& statement, const std::string& frame,
-            const std::vector<SpeedBound>& bounds);
+  /// A step's answer, or why there is none, and what it allows.
+  void tell(const Outcome& outcome, const Statement& statement, const std::string& frame, const SpeedScale& speed);
   /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
   void setHint(const std::string& hint);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "obstacle/known_space_impl.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
@@ -45,24 +46,29 @@ constexpr OccupiedLeaf WHOLE_MAP{{0, 0, 0}, VoxelTree::KEYS};
 
 }  // namespace
 
-struct KnownSpace::Impl {
-  Impl(double resolution, const std::vector<OccupiedLeaf>& leaves) : resolution_m(resolution), tree(leaves) {}
-
-  double resolution_m;
-  VoxelTree tree;
-};
-
 std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
                                                     const std::vector<OccupiedLeaf>& known_leaves) {
   if (!isResolution(resolution_m)) throw std::invalid_argument(noResolution("resolution_m", resolution_m));
   return std::shared_ptr<const KnownSpace>(new KnownSpace(std::make_unique<Impl>(resolution_m, known_leaves)));
 }
 
+std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m, const std::vector<OccupiedLeaf>& known_leaves,
+                                                    std::vector<OccupiedLeaf> found) {
+  const std::shared_ptr<const KnownSpace> known = build(resolution_m, known_leaves);
+  known->impl_->found = std::move(found);
+  return known;
+}
+
+const std::vector<OccupiedLeaf>* KnownSpace::found() const { return impl_->found ? &*impl_->found : nullptr; }
+
 KnownSpace::KnownSpace(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 KnownSpace::~KnownSpace() = default;
 
 double KnownSpace::resolution() const { return impl_->resolution_m; }
-std::size_t KnownSpace::memoryBytes() const { return sizeof(Impl) + impl_->tree.memoryBytes(); }
+std::size_t KnownSpace::memoryBytes() const {
+  return sizeof(Impl) + impl_->tree.memoryBytes() +
+         (impl_->found ? impl_->found->capacity() * sizeof(OccupiedLeaf) : 0);
+}
 
 bool KnownSpace::isKnown(const Box& region_m) const {
   if (region_m.empty()) return true;

@@ -43,6 +43,14 @@ inline bool isInside(const OccupiedLeaf& cube, const KeyBox& box) {
   return true;
 }
 
+/// Calls visit(voxel) for the finest voxels of a cube within the box.
+template <class Visit>
+void visitVoxels(const OccupiedLeaf& cube, const KeyBox& box, Visit& visit) {
+  if (!meets(cube, box)) return;
+  if (cube.size == 1) return visit(cube);
+  for (const OccupiedLeaf& part : eighthsOf(cube)) visitVoxels(part, box, visit);
+}
+
 /// Calls visit(part) for the parts of a cube that no leaf of the tree covers, as large ones as there are.
 template <class Visit>
 void visitUncovered(const VoxelTree& tree, const OccupiedLeaf& cube, Visit&& visit) {
@@ -67,13 +75,18 @@ inline Beside besideNode(const VoxelTree& tree, std::uint32_t index, const Voxel
   return {nullptr, other.coverage(16 * at[0], 16 * at[1], 16 * at[2], 16) == VoxelTree::Coverage::FULL};
 }
 
+/// All voxels that there are.
+constexpr KeyBox ALL_KEYS{{0, 0, 0}, {VoxelTree::KEYS - 1, VoxelTree::KEYS - 1, VoxelTree::KEYS - 1}};
+
 /// Calls visit(part) for what of the tree's leaves the other tree does not cover: voxels of small leaves, and of others
-/// parts as large as there are.
+/// parts as large as there are. What does not meet the box may be left out.
 template <class Visit>
-void visitDifference(const VoxelTree& tree, const VoxelTree& other, Visit&& visit) {
+void visitDifference(const VoxelTree& tree, const VoxelTree& other, Visit&& visit, const KeyBox& box = ALL_KEYS) {
   for (std::uint32_t p = 0; p < tree.nodes(1).size(); ++p) {
     const VoxelTree::Node& parent = tree.nodes(1)[p];
     const std::array<std::uint16_t, 3>& at = tree.nodeCell(1, p);
+    const auto key_of = [&](std::size_t axis) { return static_cast<std::uint16_t>(16 * at[axis]); };
+    if (!meets(OccupiedLeaf{{key_of(0), key_of(1), key_of(2)}, 16}, box)) continue;
     const Beside beside = besideNode(tree, p, other);
     if (beside.covered) continue;
     for (std::uint64_t children = parent.child; children != 0; children &= children - 1) {
@@ -91,7 +104,7 @@ void visitDifference(const VoxelTree& tree, const VoxelTree& other, Visit&& visi
     }
   }
   for (std::size_t leaf = tree.firstLeafOfLevel(1); leaf < tree.leaves().size(); ++leaf) {
-    visitUncovered(other, tree.leaves()[leaf], visit);
+    if (meets(tree.leaves()[leaf], box)) visitUncovered(other, tree.leaves()[leaf], visit);
   }
 }
 

@@ -117,6 +117,7 @@ DecodedOctomap CloudMap::leaves(const OctomapLimits& limits) const {
   checkLimits(countsOf(leaves, limits.free_leaves), limits);
   map.occupied = leaves.occupied;
   if (limits.free_leaves) map.free = leaves.free;
+  if (limits.log_odds) map.found = leaves.found;
   return map;
 }
 

@@ -62,13 +62,14 @@ inline void checkLimits(const OctomapCounts& counts, const OctomapLimits& limits
   if (limits.accept) limits.accept(counts);
 }
 
-/// `walk(leaf)` calls leaf(cube, occupied) for each leaf in Morton order, the same each time. Throws OctomapError where
-/// the limits are exceeded.
+/// `walk(leaf)` calls leaf(cube, log_odds) for each leaf in Morton order, the same each time. A log-odds of 0 or more
+/// is occupied. Throws OctomapError where the limits are exceeded.
 template <class Walk>
-void listLeaves(const Walk& walk, const OctomapLimits& limits, DecodedOctomap& map) {
+void listLeaves(const Walk& walk, const OctomapLimits& limits, bool has_log_odds, DecodedOctomap& map) {
   OctomapCounts counts;
   NodeCounter occupied_nodes, known_nodes;
-  walk([&](const OctreeCube& cube, bool occupied) {
+  walk([&](const OctreeCube& cube, float log_odds) {
+    const bool occupied = log_odds >= 0;
     ++(occupied ? counts.occupied : counts.free);
     if (occupied) occupied_nodes.add(cube.leaf());
     known_nodes.add(cube.leaf());
@@ -78,7 +79,11 @@ void listLeaves(const Walk& walk, const OctomapLimits& limits, DecodedOctomap& m
   checkLimits(counts, limits);
   map.occupied.reserve(counts.occupied);
   if (limits.free_leaves) map.free.reserve(counts.free);
-  walk([&](const OctreeCube& cube, bool occupied) {
+  const bool keeps_odds = limits.log_odds && has_log_odds;
+  if (keeps_odds) map.log_odds.reserve(counts.occupied);
+  walk([&](const OctreeCube& cube, float log_odds) {
+    const bool occupied = log_odds >= 0;
+    if (occupied && keeps_odds) map.log_odds.push_back(log_odds);
     if (occupied || limits.free_leaves) (occupied ? map.occupied : map.free).push_back(cube.leaf());
   });
 }

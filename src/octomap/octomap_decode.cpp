@@ -70,7 +70,7 @@ void checkDepth(const Cube& parent, const Bytes& bytes) {
   }
 }
 
-/// Calls leaf(cube, occupied) for each leaf below the inner node whose two bytes come next.
+/// Calls leaf(cube, log_odds) for each leaf below the inner node whose two bytes come next: 1 or -1, which they tell.
 template <class Leaf>
 void walkBinary(Bytes& bytes, const Cube& cube, Leaf& leaf) {
   const unsigned char* bits = bytes.take(2);
@@ -82,14 +82,14 @@ void walkBinary(Bytes& bytes, const Cube& cube, Leaf& leaf) {
           "octomap data are a root without children, which in a binary map is all occupied, all free and all unknown "
           "alike; send the full map (binary: false), or no data where nothing is known");
     }
-    leaf(cube, false);  // an inner node without children: liboctomap takes it for free
+    leaf(cube, -1.0f);  // an inner node without children: liboctomap takes it for free
     return;
   }
   for (unsigned i = 0; i < 8; ++i) {
     const unsigned state = children >> (2 * i) & 3;
     if (state == 1 || state == 2) {
       checkDepth(cube, bytes);
-      leaf(cube.child(i), state == 2);
+      leaf(cube.child(i), state == 2 ? 1.0f : -1.0f);
     } else if (state == 3) {
       checkDepth(cube, bytes);
       walkBinary(bytes, cube.child(i), leaf);
@@ -109,7 +109,7 @@ void walkFull(Bytes& bytes, const Cube& cube, std::size_t extra, Leaf& leaf) {
   }
   const unsigned children = node[sizeof(float) + extra];
   if (children == 0) {
-    leaf(cube, log_odds >= 0);
+    leaf(cube, log_odds);
     return;
   }
   checkDepth(cube, bytes);
@@ -149,7 +149,7 @@ DecodedOctomap decode(const OctomapHeader& header, const unsigned char* data, st
   }
   if (!header.empty && size == header.length) throw OctomapError("octomap header: no data follow it");
   const Bytes bytes(data + header.length, size - header.length);
-  listLeaves([&](auto&& leaf) { walk(bytes, header.binary, kind, leaf); }, limits, map);
+  listLeaves([&](auto&& leaf) { walk(bytes, header.binary, kind, leaf); }, limits, !header.binary, map);
   return map;
 }
 

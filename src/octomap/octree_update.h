@@ -37,6 +37,7 @@ class CloudTree : public octomap::OcTree {
 struct TreeLeaves {
   std::vector<OccupiedLeaf> occupied, free;
   std::vector<OccupiedLeaf> doubtful;  ///< voxels: CloudMap::doubtful()
+  std::vector<OccupiedLeaf> found;     ///< voxels that a point of this view fills
 };
 
 struct UpdateLimits {
@@ -204,6 +205,7 @@ class OctreeUpdate {
     for (; end_ < ends_.size() && ends_[end_] >> 1 < at.cube.end(); ++end_) fills = fills || (ends_[end_] & 1) != 0;
     if (!fills || full_) return keep(at);
     doubtful_.skip(at.cube);
+    after_.found.push_back(at.cube.leaf());
     const Node* leaf = leafOf(at);
     if (leaf && leaf->getLogOdds() >= most_) return keep(at);
     take(VOXEL_DEPTH);

@@ -64,7 +64,7 @@ std::string swappedHint(const DecodedMesh& mesh, const MeshInputConfig& config) 
   std::ostringstream text;
   text << "topology/rows and topology/cols look swapped: neighbours are " << given << " m apart as " << rows << " x "
        << cols << ", but " << swapped << " m as " << cols << " x " << rows << "; set rows: " << cols
-       << ", cols: " << rows;
+       << ", cols: " << rows << " (rows:=" << cols << " cols:=" << rows << " of the launch files)";
   return text.str();
 }
 
@@ -107,7 +107,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     status = StepStatus::NO_TRANSFORM;
   switch (status) {
     case StepStatus::NO_TRANSFORM:
-      return "publish it on /tf or /tf_static for these stamps (see rosrun tf tf_echo), "
+      return "publish it on /tf or /tf_static for these stamps (see rosrun tf2_tools echo.py), "
              "or set fixed_frame to a frame of the same tree";
     case StepStatus::NO_MAP:
       // One that came is no matter of its rate, and may be a file.
@@ -129,13 +129,18 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
       return "the publisher must stamp every frame anew";
     case StepStatus::VERTEX_COUNT:
       if (reason.compare(0, 10, "parameter ") == 0) return "the vertices are numbered from 0";
-      return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
+      return (reason.find("topology/rows") != std::string::npos
+                  ? "correct topology/rows and topology/cols (rows:= and cols:= of the launch files), and "
+              : reason.find("topology file") != std::string::npos ? "give this mesh's own as topology/file, and "
+                                                                  : "") +
+             std::string("publish NaN for points that were lost");
     case StepStatus::PARTIAL:
       if (reason.find("not used: QUEUE_FULL") != std::string::npos) return adviceFor(StepStatus::QUEUE_FULL, "", "");
       if (reason.find("(no transform") == std::string::npos && reason.find("NO_TRANSFORM: ") == std::string::npos) {
         return {};
       }
-      return "see whether its tf comes (rosrun tf tf_echo; for a robot robot_state_publisher and its joint states); "
+      return "see whether its tf comes (rosrun tf2_tools echo.py; for a robot robot_state_publisher and its joint "
+             "states); "
              "one that comes late needs a larger transform_timeout_s";
     case StepStatus::DEADLINE:
       return "raise step_budget_ms or num_threads, or send fewer vertices";
@@ -149,12 +154,16 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
   }
 }
 
-std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
+std::string meshDoubt(const DecodedMesh& mesh, const MeshInputConfig& config) {
+  // With rows and columns swapped any points look shuffled: the cure is said alone.
+  const std::string swapped = swappedHint(mesh, config);
+  return joined(sizeHint("the mesh", mesh.positions, "scale them in the publisher"),
+                swapped.empty() ? shuffledHint(mesh) : swapped);
+}
+
+std::string meshHint(const DecodedMesh& mesh) {
   std::string text;
-  const auto add = [&](const std::string& hint) { text += (text.empty() || hint.empty() ? "" : "; ") + hint; };
-  add(sizeHint("the mesh", mesh.positions, "scale them in the publisher"));
-  add(swappedHint(mesh, config));
-  add(shuffledHint(mesh));
+  const auto add = [&](const std::string& hint) { text = joined(text, hint); };
   if (mesh.unread_markers > 0) {
     add(std::to_string(mesh.unread_markers) + (mesh.unread_markers == 1 ? " marker" : " markers") +
         " beside the mesh, the first of which is " + mesh.unread_marker +
@@ -170,7 +179,7 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   return text;
 }
 
-std::string rigidHint(const std::string& file, const Positions& positions, double scale) {
+std::string rigidDoubt(const std::string& file, const Positions& positions, double scale) {
   std::ostringstream mend;
   mend << "set rigid/scale: " << 0.001 * scale;
   return sizeHint("rigid/mesh " + file, positions, mend.str());

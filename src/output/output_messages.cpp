@@ -259,6 +259,9 @@ void fillState(const Statement& statement, deformable_ccd::State& message) {
   if (is_news && std::none_of(assurance.excluded.begin(), assurance.excluded.end(), tells)) {
     message.reason += "; nothing was checked against a map";
   }
+  for (const std::string& doubt : statement.doubts) {
+    if (message.proved || !statement.is_doubts_fault) message.reason += "; in doubt: " + doubt;
+  }
   if (!statement.broken.empty()) message.reason += "; the promise of ~safe_until was void: " + statement.broken;
   message.missing = assurance.missing;
   message.excluded = assurance.excluded;

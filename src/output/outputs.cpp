@@ -32,6 +32,7 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
     clearance_ = node.advertise<deformable_ccd::ClearanceArray>("clearance", TOPIC_QUEUE);
   }
   if (config.promises()) safe_until_ = node.advertise<deformable_ccd::SafeUntil>("safe_until", TOPIC_QUEUE, true);
+  if (config.intent) along_path_ = node.advertise<deformable_ccd::AlongPath>("along_path", TOPIC_QUEUE);
 }
 
 std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vector<Body>& bodies,
@@ -91,6 +92,8 @@ void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, con
 }
 
 void Outputs::publishSafeUntil(const deformable_ccd::SafeUntil& message) { safe_until_.publish(message); }
+
+void Outputs::publishAlongPath(const deformable_ccd::AlongPath& message) { along_path_.publish(message); }
 
 void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }
 

@@ -40,6 +40,8 @@ class Outputs {
                          const MarkerConfig& markers, const std::string& frame);
   /// Latched. Only where the configuration promises something.
   void publishSafeUntil(const deformable_ccd::SafeUntil& message);
+  /// Only where paths are listened to.
+  void publishAlongPath(const deformable_ccd::AlongPath& message);
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.
   /// Nothing is shown any more: after a reset or when disabled. An empty frame: nothing was shown yet.
@@ -47,7 +49,7 @@ class Outputs {
 
  private:
   ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, predicted_, time_to_contact_, patches_, events_,
-      clearance_, safe_until_;
+      clearance_, safe_until_, along_path_;
   deformable_ccd::ContactArray list_;  // each is made in the memory of the one before
 };
 

@@ -70,7 +70,8 @@ deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch
   out.seconds = promise.seconds();
   out.others_until = toRosTime(promise.others_until_ns);
   out.others_seconds = promise.othersSeconds();
-  out.left = (out.until - now).toSec();
+  // Where stamps are ahead of the clock here the promise is made now, and does not last until that clock is there.
+  out.left = std::min(out.seconds, (out.until - now).toSec());
   out.most = MOST_PROMISED_S;
   out.reason = promise.reason;
   fillPair(outcome, promise.limiting, out);
@@ -83,7 +84,10 @@ deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch
 
 deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
                                         const SpeedLaw& law, const std::string& frame) {
-  const SpeedScale speed = speedScale(outcome, bounds, law);
+  return toSpeedScale(outcome, speedScale(outcome, bounds, law), frame);
+}
+
+deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const SpeedScale& speed, const std::string& frame) {
   deformable_ccd::SpeedScale out;
   out.header = headerOf(outcome.stamp_ns, frame);
   out.scale = speed.scale;
@@ -93,6 +97,27 @@ deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vecto
   out.needed = speed.needed_m;
   if (outcome.answered) out.holds_until = toRosTime(outcome.stamp_ns);
   return out;
+}
+
+deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath& path, const AlongPath& along,
+                                      const std::string& frame) {
+  deformable_ccd::AlongPath out;
+  out.header = headerOf(outcome.stamp_ns, frame);
+  out.used = along.unused.empty();
+  out.reason = along.unused;
+  for (const IntendedPath::Of& of : path.bodies) out.bodies.push_back(outcome.step->bodies[of.body].name);
+  out.ahead = path.endsAt();
+  out.contact = static_cast<std::uint8_t>(along.contact);
+  return out;
+}
+
+std::string assumedOf(const Outcome& outcome, const IntendedPath& path) {
+  std::ostringstream text;
+  for (const IntendedPath::Of& of : path.bodies)
+    text << (text.tellp() > 0 ? ", '" : "'") << outcome.step->bodies[of.body].name << "'";
+  text << " go along the intended path, at no more than its pace, within " << path.deviation_m << " m and "
+       << path.deviation_rate_m_s << " m/s";
+  return text.str();
 }
 
 std::string whyTooOld(double since_stamp_s, double since_arrival_s, const SpeedLaw& law) {

@@ -4,9 +4,11 @@
 #include <string>
 #include <vector>
 
+#include <deformable_ccd/AlongPath.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
 
+#include "dccd/intended.h"
 #include "dccd/monitor_extras.h"
 
 namespace dccd {
@@ -18,6 +20,12 @@ deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch
 /// What the distances allow; whether all else is proved is said by limitSpeed().
 deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
                                         const SpeedLaw& law, const std::string& frame);
+deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const SpeedScale& speed, const std::string& frame);
+/// What a path says of a step.
+deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath& path, const AlongPath& along,
+                                      const std::string& frame);
+/// That a promise rests on the path, a sentence.
+std::string assumedOf(const Outcome& outcome, const IntendedPath& path);
 /// Why the newest answer is too old for the law, which counts from its frame's stamp, but at least from its arrival; so
 /// long ago were the two [s]. Empty: it is not.
 std::string whyTooOld(double since_stamp_s, double since_arrival_s, const SpeedLaw& law);

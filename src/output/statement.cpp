@@ -9,6 +9,7 @@
 #include "base/contact_fields.h"
 #include "output/advice.h"
 #include "output/patch_messages.h"
+#include "report/words.h"
 
 namespace dccd {
 
@@ -68,7 +69,8 @@ std::string besides(const Outcome& outcome) {
   std::string text;
   const std::size_t lasting = lastingPatches(outcome);
   if (lasting > 0) text += std::to_string(lasting) + (lasting == 1 ? " patch lasts, " : " patches last, ");
-  if (outcome.counts.expected > 0) text += std::to_string(outcome.counts.expected) + " expected ones, ";
+  const std::size_t expected = outcome.counts.expected;
+  if (expected > 0) text += std::to_string(expected) + (expected == 1 ? " expected contact, " : " expected contacts, ");
   return text;
 }
 
@@ -77,11 +79,16 @@ std::string noContact(const Outcome& outcome) {
   const std::string start = std::string("starts ") + toString(outcome.start_state);
   const Assurance assurance = assuranceOf(outcome);
   if (assurance.clear()) return "no contact, " + start;
+  // How it starts is no news then, and "INTERSECTING" sounds like an alarm.
+  if (assurance.proved && assurance.touching == Touching::EXPECTED) {
+    const std::string more = besides(outcome);
+    return "only what is expected touches" + (more.empty() ? "" : ": " + more.substr(0, more.size() - 2));
+  }
   std::string text = outcome.tracked && assurance.proved ? "no new contact, " : "no contact found, but ";
   if (outcome.status != StepStatus::OK) {
     text += toString(outcome.status) + (outcome.reason.empty() ? "" : " (" + outcome.reason + ")") + ", ";
   }
-  for (const std::string& sentence : outcome.unproved) {
+  for (const std::string& sentence : assurance.missing) {
     if (sentence != outcome.reason) text += sentence + ", ";
   }
   return text + besides(outcome) + start;
@@ -96,8 +103,19 @@ bool crossesAsNews(const Outcome& outcome) {
 
 }  // namespace
 
-Statement statementOf(const Outcome& outcome, const std::string& map_source, const std::string& broken) {
-  return {assuranceOf(outcome), touchesInWords(outcome), adviceFor(outcome.status, outcome.reason, map_source), broken};
+Statement statementOf(const Outcome& outcome, const std::string& map_source, const std::string& broken,
+                      std::vector<std::string> doubts) {
+  const std::string touches = joined(touchesInWords(outcome), insideInWords(outcome));
+  Statement said{assuranceOf(outcome), touches, adviceFor(outcome.status, outcome.reason, map_source), broken,
+                 std::move(doubts)};
+  // A mesh of which each part touches many others makes more work than there is time or memory for.
+  const StepStatus status = outcome.status;
+  const bool is_too_much = status == StepStatus::TRUNCATED || status == StepStatus::DEADLINE;
+  said.is_doubts_fault = is_too_much && !said.doubts.empty();
+  if (!said.is_doubts_fault) return said;
+  said.hint.clear();
+  if (!said.assurance.proved) said.assurance.hinder(said.doubts);
+  return said;
 }
 
 std::string firstContactInWords(const Outcome& outcome, double toc, const Contact* first,

@@ -257,12 +257,11 @@ class Explanation {
 
     const double tolerance_m = holdsDistance(options_.accuracy.rung) ? options_.accuracy.tolerance_m : 0;
     const SeparationRule rule(scene, a, b, tolerance_m);
-    const std::uint64_t key = std::uint64_t{place[0].rank} << 32 | place[1].rank;
-    const double apart_m =
-        a == b ? impl.prepared.left_out.of_body[a].distance(kind_, key) : std::numeric_limits<double>::infinity();
-    const PairSeparation separation = rule.of(kind_, quad, apart_m);
+    const PairSeparation separation = rule.of(kind_, quad);
     if (separation.left_out) {
       say("separation", Says::KEPT, "closer than the separation in the reference frame: left out of it");
+    } else if (separation.unsure_m > 0) {
+      say("separation", Says::KEPT, "closer in the reference frame than the uncertainty reaches: left out of that");
     } else {
       saySeparation(separation.total_m, separation.noise_m);
     }

@@ -216,11 +216,22 @@ void visitPatches(Archive& a, Answer& answer) {
   a.array(answer.patch_of);
 }
 
+template <typename Archive, typename Sentences>
+void visitSentences(Archive& a, Sentences& sentences) {
+  a.count(sentences, TEXT_BYTES);
+  for (auto& sentence : sentences) a.text(sentence);
+}
+
 /// A recording has in words what was said of the claim.
-void restoreClaim(RecordingWriter&, const Outcome&) {}
-void restoreClaim(RecordingReader&, Outcome& answer) {
+void visitClaim(RecordingWriter& a, const Outcome& answer) {
+  const std::vector<std::string> missing = answer.missing();
+  visitSentences(a, missing);
+}
+void visitClaim(RecordingReader& a, Outcome& answer) {
+  std::vector<std::string> missing;
+  visitSentences(a, missing);
+  answer.claim = Claim::thatWasSaid(missing);
   answer.start_state_complete = answer.complete;
-  if (answer.unproved.empty()) answer.claim.add(0, 1, {});
 }
 
 template <typename Archive, typename Answer>
@@ -232,12 +243,9 @@ void visitAnswer(Archive& a, Answer& answer) {
   for (auto& contact : answer.contacts) visitContact(a, contact);
   a.count(answer.intersections, INTERSECTION_BYTES);
   for (auto& crossing : answer.intersections) visitValues(a, crossing.body, crossing.vertex, crossing.expected);
-  for (auto* sentences : {&answer.unproved, &answer.excluded, &answer.expected}) {
-    a.count(*sentences, TEXT_BYTES);
-    for (auto& sentence : *sentences) a.text(sentence);
-  }
+  visitClaim(a, answer);
+  for (auto* sentences : {&answer.excluded, &answer.expected}) visitSentences(a, *sentences);
   visitPatches(a, answer);
-  restoreClaim(a, answer);
 }
 
 template <typename Archive, typename Body>
@@ -251,27 +259,23 @@ void visitSeparations(Archive& a, Body& body) {
 void visitReference(RecordingWriter& a, const Body& body) {
   a.flag(body.reference != nullptr);
   if (!body.reference) return;
-  a.array(body.reference->positions);
-  a.array(body.reference->radius_m);
+  a.array(*body.reference);
 }
 
 void visitReference(RecordingReader& a, Body& body) {
   const std::size_t vertices = body.t0->size();
-  const auto fits = [&](const std::vector<double>& radius) { return radius.empty() || radius.size() == vertices; };
   if (body.radius_m->empty()) {
     body.radius_m = nullptr;
-  } else if (!fits(*body.radius_m)) {
+  } else if (body.radius_m->size() != vertices) {
     a.fail("body '" + body.name + "' has " + std::to_string(body.radius_m->size()) + " radii");
   }
   bool present = false;
   a.flag(present);
   if (!present) return;
-  ReferenceFrame reference;
-  a.array(reference.positions);
-  a.array(reference.radius_m);
-  if (reference.positions.size() != vertices || !fits(reference.radius_m)) {
-    a.fail("the reference frame of body '" + body.name + "' has " + std::to_string(reference.positions.size()) +
-           " vertices and " + std::to_string(reference.radius_m.size()) + " radii");
+  Positions reference;
+  a.array(reference);
+  if (reference.size() != vertices) {
+    a.fail("the reference frame of body '" + body.name + "' has " + std::to_string(reference.size()) + " vertices");
   }
   body.reference = share(std::move(reference));
 }

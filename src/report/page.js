@@ -73,6 +73,7 @@ document.getElementById('headline').textContent = R.headline;
       if (text.length > 260) p.textContent = text.slice(0, 250) + '…';
       if (t !== undefined) { p.dataset.t = t; p.addEventListener('click', () => lanes.seek(t)); } }); };
   const P = R.proof, steps = n => n + (n === 1 ? ' step' : ' steps'), fact = (R.facts.find(([name]) => name === 'octomap') || ['', ''])[1];
+  if (P.doubts.length) card('doubt', 'In doubt', ...P.doubts.map(text => [text]));
   if (!P.unproved) card('good', P.steps === 1 ? 'The only step is proved' : `All ${steps(P.steps)} are proved`, ['What does not touch is known not to.']);
   else card('doubt', P.proved ? `${P.steps - P.proved} of ${steps(P.steps)} are not proved` : 'Nothing is proved', [P.unproved]);
   const unseen = P.not_looked_at.map(text => [text[0].toUpperCase() + text.slice(1) + '.']), mapless = /^(none|off)/.test(fact);
@@ -80,7 +81,7 @@ document.getElementById('headline').textContent = R.headline;
   const firsts = R.partners.filter(p => p.first).sort((p, q) => p.first.t - q.first.t);
   const lasting = R.partners.filter(p => !p.first && p.bars.length).map(p => [partners(p) + (p.bars.every(b => b[3]) ? ': as expected' : ': since before it was looked at'), p.bars[0][1]]);
   const answered = R.steps.some(s => s.answered), lines = firsts.map(p => [`${partners(p)}: ${p.first.t.toFixed(3)} s after the start`, p.first.t]).concat(lasting);
-  card(lines.length ? '' : answered && !P.unproved ? 'good' : 'doubt', firsts.length ? 'First new contact' : lines.length ? 'No new contact' : answered ? 'Nothing was found to touch' : 'No answer',
+  card(lines.length ? '' : answered && !P.unproved ? 'good' : 'doubt', firsts.length ? 'First contact' : lines.length ? 'No new contact' : answered ? 'Nothing was found to touch' : 'No answer',
     ...lines.slice(0, 6), ...(lines.length > 6 ? [[`${lines.length - 6} more pairs below`]] : [])); }
 { const t = table('facts', null, R.facts);  // what has many lines is folded under the first
   R.facts.forEach(([, value], i) => { const end = value.indexOf('\n'), cell = t.rows[i].cells[1]; if (end < 0) return;
@@ -182,8 +183,7 @@ const longest = list => Math.max(1e-12, ...list);
   R.effects.forEach((e, i) => { if (!e.running) t.rows[i + 1].className = 'off'; }); }
 document.getElementById('effects_note').textContent =
   `Each pair and each moment counts in one row alone: a pair that carries a distance in tracker_noise or else minimum_separation, no longer in self_collision, body_body or octomap. Bounds of bodies: ${R.step_counters.bodies_refitted} times computed, ${R.step_counters.bodies_kept} times kept from the step before.` +
-  (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +
-    `they came up ${R.step_counters.left_out_met} times.` : '');
+  (R.step_counters.left_out_met ? ` Pairs that are closer in the reference frame than their separation or uncertainty, and left out of it, came up ${R.step_counters.left_out_met} times.` : '');
 { const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'came true', 'not observed', 'not predicted'],
   [[l.horizon_s, l.came_true, l.not_observed, l.not_predicted]]);
   else document.getElementById('look_ahead_part').remove(); }

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <iomanip>
 #include <limits>
-#include <tuple>
 
 #include "base/contact_fields.h"
 #include "dccd/assurance.h"
@@ -187,10 +186,17 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
 
 void Report::addFirstContact(const Outcome& o, const std::vector<Body>& bodies) {
   if (!first_contact_.empty()) return;
-  const auto first = std::min_element(o.contacts.begin(), o.contacts.end(), [](const auto& a, const auto& b) {
-    return std::tie(a.expected, a.toc_lower) < std::tie(b.expected, b.toc_lower);
-  });
-  if (first == o.contacts.end() || first->expected) return;
+  // As of the lanes: what was there when its step began came before, at a time that nobody saw.
+  const Contact* first = nullptr;
+  for (const Contact& one : o.contacts) {
+    if (one.expected) continue;
+    if (one.initial) {
+      if (first_initial_.empty()) first_initial_ = contactInWords(one, bodies);
+    } else if (!first || one.toc_lower < first->toc_lower) {
+      first = &one;
+    }
+  }
+  if (!first) return;
   first_contact_s_ = secondsBetween(origin_ns_, o.start_ns) + first->toc_lower * o.duration_s();
   first_contact_ = contactInWords(*first, bodies);
 }
@@ -229,7 +235,8 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies, std::int64_t
 void Report::addProof(const Outcome& o) {
   ++frames_;
   if (o.answered && o.total_contacts == 0 && o.touching != Touching::NONE) {
-    ++lasting_[std::string("start ") + toString(o.start_state)];
+    const std::string inside = insideInWords(o);
+    ++lasting_[inside.empty() ? std::string("start ") + toString(o.start_state) : inside];
   }
   const Assurance assurance = assuranceOf(o);
   first_frames_ += o.status == StepStatus::FIRST_FRAME;
@@ -243,20 +250,6 @@ void Report::addProof(const Outcome& o) {
 void Report::setLookAhead(const LookAheadSummary& summary, double horizon_s) {
   look_ahead_ = summary;
   horizon_s_ = horizon_s;
-}
-
-void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies) {
-  left_out_ = pairs.size();
-  if (pairs.empty()) return;
-  std::ofstream file(folder_ + "/left_out.csv");
-  file << "kind,body,v0,v1,v2,v3\n";
-  for (const LeftOutPair& pair : pairs) {
-    file << factsOf(pair.kind).short_name << ',' << csvField(bodyName(pair.body, bodies));
-    for (const Index v : pair.vertex) file << ',' << v;
-    file << '\n';
-  }
-  file.close();
-  if (!file) throw std::runtime_error(folder_ + "/left_out.csv: cannot be written");
 }
 
 }  // namespace dccd

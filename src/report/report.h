@@ -20,9 +20,8 @@
 namespace dccd {
 
 /// Writes into a folder: contacts.csv, steps.csv, patches.csv and events.csv (the same bytes for any number of
-/// threads), timing.csv, left_out.csv (pairs that the minimum separation leaves out, where there are any),
-/// clearance.csv (distances, where they were asked for), report.json and report.html. Outcomes are added in order; kept
-/// are their summaries and, in a bounded amount of memory, what the page's player shows.
+/// threads), timing.csv, clearance.csv (distances, where they were asked for), report.json and report.html. Outcomes
+/// are added in order; kept are their summaries and, in a bounded amount of memory, what the page's player shows.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
@@ -32,8 +31,6 @@ class Report {
   void add(const Outcome& outcome, const std::vector<Body>& bodies, std::int64_t told_ns = 0,
            const std::string& clock_body = {});
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
-  /// Writes left_out.csv. Throws std::runtime_error naming the file.
-  void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   /// What became of the promises of ~safe_until, in words; empty: there were none.
   void setPromises(std::string in_words) { promises_ = std::move(in_words); }
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
@@ -45,6 +42,9 @@ class Report {
   /// What the run did not look at, a sentence each: it stands beside what was found.
   void setNotLookedAt(std::vector<std::string> sentences) { not_looked_at_ = std::move(sentences); }
 
+  /// Why what was looked at may be something else, a sentence each: it stands beside the proof.
+  void setDoubts(std::vector<std::string> sentences) { doubts_ = std::move(sentences); }
+
   /// Why not all of the recording was looked at, which ends the proof of the whole; empty: all was.
   void setUnansweredEnd(std::string sentence) { unanswered_end_ = std::move(sentence); }
 
@@ -52,7 +52,7 @@ class Report {
   /// naming the file.
   void finish();
   /// One sentence: the first contact, or that there was none, or that there was no answer; whether all of it is proved,
-  /// with `reasons` also why not; and what was not looked at.
+  /// with `reasons` also why not; what is in doubt; and what was not looked at.
   std::string headline(bool reasons = true) const;
   /// What stands in the way of a proof: "3 of 40 frames: NO_MAP: no octomap has been received yet (3)". Empty: every
   /// frame but a first one, of which there is nothing to say, has an answer that is proved, there is one, and the
@@ -91,13 +91,12 @@ class Report {
   std::size_t with_contact_ = 0,
               with_expected_ = 0;  // steps; with contacts that are not expected, and with such that are
   double first_contact_s_ = 0;
-  std::string first_contact_;
-  std::string rows_;  // of the steps, as JSON, a line each
+  std::string first_contact_, first_initial_;  // of those that are not expected: a new one, one that was there before
+  std::string rows_;                           // of the steps, as JSON, a line each
   std::vector<BodyHeat> heat_;
   std::array<std::vector<double>, static_cast<std::size_t>(Stage::COUNT)> stage_ms_;
   StepStats sum_;
   std::vector<double> total_ms_;
-  std::size_t left_out_ = 0;
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;
   std::vector<EffectDecision> effects_;
@@ -107,7 +106,7 @@ class Report {
   PlayerData player_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
-  std::vector<std::string> not_looked_at_;
+  std::vector<std::string> not_looked_at_, doubts_;
   std::string unanswered_end_;
   FrameCounters counters_;
 };

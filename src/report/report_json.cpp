@@ -65,6 +65,9 @@ std::string Report::headline(bool reasons) const {
   if (!first_contact_.empty()) {
     text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
          << with_contact_ << " of " << answered_ << answeredSteps(answered_);
+  } else if (!first_initial_.empty()) {
+    text << "No new contact; since before it was looked at " << first_initial_ << "; contacts in " << with_contact_
+         << " of " << answered_ << answeredSteps(answered_);
   } else if (answered_ == 0) {
     text << "No answer";
   } else {
@@ -83,6 +86,7 @@ std::string Report::headline(bool reasons) const {
   } else {
     text << "; not proved: " << (reasons || unproved_.empty() ? unproved() : ofFrames(unprovedFrames(), frames_));
   }
+  for (const std::string& sentence : doubts_) text << "; in doubt: " << sentence;
   for (const std::string& sentence : not_looked_at_) text << "; " << sentence;
   text << '.';
   return text.str();
@@ -128,6 +132,7 @@ nlohmann::json Report::json() const {
   j["proof"] = {{"steps", frames_ - first_frames_},
                 {"proved", frames_ - first_frames_ - unprovedFrames()},
                 {"unproved", unproved()},
+                {"doubts", doubts_},
                 {"not_looked_at", not_looked_at_}};
   j["facts"] = nlohmann::json::array();
   for (const auto& [name, value] : facts_) j["facts"].push_back(nlohmann::json::array({name, value}));
@@ -153,7 +158,6 @@ nlohmann::json Report::json() const {
                 {"max_ms", quantile(total_ms_, 1)}};
   j["effects"] = effectsJson();
   for (const StepCounter& counter : STEP_COUNTERS) j["step_counters"][counter.name] = sum_.*counter.value;
-  j["left_out"] = {{"pairs", left_out_}};
   j["look_ahead"] = lookAheadJson();
   j["study"] = study_;
   j["partners"] = lanes_.json();

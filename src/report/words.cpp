@@ -1,5 +1,8 @@
 #include "report/words.h"
 
+#include <set>
+#include <sstream>
+
 namespace dccd {
 
 std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
@@ -11,6 +14,26 @@ std::string csvField(const std::string& text) {
   std::string quoted = "\"";
   for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
   return quoted + '"';
+}
+
+std::string insideInWords(const Outcome& outcome) {
+  std::set<std::array<std::uint16_t, 2>> told;
+  std::ostringstream text;
+  for (const StartIntersection& one : outcome.intersections) {
+    if (one.vertex[1] != NO_INDEX || one.body[1] == OBSTACLE_BODY || !told.insert(one.body).second) continue;
+    const std::vector<Body>& bodies = outcome.step->bodies;
+    const Body& closed = bodies[one.body[1]];
+    Box box;
+    for (const Vec3& p : *closed.t0) {
+      box.min = box.min.cwiseMin(p);
+      box.max = box.max.cwiseMax(p);
+    }
+    text << (told.size() > 1 ? ", " : "") << bodies[one.body[0]].name << " lies inside of " << closed.name
+         << ", which is " << (box.max - box.min).maxCoeff()
+         << " m across: " << (closed.rigid ? "rigid/scale: 0.001 if its file is in millimetres, " : "")
+         << "shell: true if it is a container";
+  }
+  return text.str();
 }
 
 std::string contactInWords(const Contact& c, const std::vector<Body>& bodies) {

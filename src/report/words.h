@@ -6,6 +6,7 @@
 
 #include "dccd/body.h"
 #include "dccd/contact.h"
+#include "dccd/outcome.h"
 
 namespace dccd {
 
@@ -18,6 +19,9 @@ template <class Visit>
 void forContactVertices(const Contact& contact, Visit visit) {
   for (std::size_t i = 0; i < 4 && contact.vertex[i] != NO_INDEX; ++i) visit(contact.bodyOf(i), contact.vertex[i]);
 }
+/// Which bodies lie inside of others when the step begins, and how large those are: no contact tells of them. "rope
+/// lies inside of box, which is 400 m across: ...". Empty: none does.
+std::string insideInWords(const Outcome& outcome);
 /// "towel meets octomap (vertex against voxel face, vertex 12, certain)".
 std::string contactInWords(const Contact& contact, const std::vector<Body>& bodies);
 

@@ -54,6 +54,7 @@ class RobotMaker {
 
   Robot make(const RobotText& description, const RobotText& semantic) {
     robot_.text = description.text + '\n' + semantic.text;
+    robot_.description = description.text;
     robot_.semantic_known = semantic.name.empty();
     UrdfText urdf;
     try {
@@ -156,6 +157,7 @@ class RobotMaker {
     if (bounds.diagonal().norm() > LARGE_LINK_M) {
       hint(what + " is " + shown(bounds.diagonal().norm()) +
            " m across: if its mesh is in millimetres, write scale=\"0.001 0.001 0.001\" beside its filename");
+      robot_.doubts.push_back(robot_.hints.back());
     }
     return mesh;
   }

@@ -138,7 +138,36 @@ void reduceJoint(XMLElement& joint) {
   }
 }
 
+urdf::ModelInterfaceSharedPtr modelOf(const tinyxml2::XMLDocument& document, const HeardErrors& errors) {
+  tinyxml2::XMLPrinter printer(nullptr, true);
+  document.Print(&printer);
+  urdf::ModelInterfaceSharedPtr model;
+  try {
+    model = urdf::parseURDF(printer.CStr());
+  } catch (const std::exception& error) {
+    throw RobotTextError(error.what());
+  }
+  if (!model) throw RobotTextError(errors.said().empty() ? "the URDF reader refuses it" : errors.said());
+  return model;
+}
+
 }  // namespace
+
+urdf::ModelInterfaceSharedPtr parseJoints(const std::string& text) {
+  tinyxml2::XMLDocument document;
+  XMLElement& robot = parseRobotXml(text, document);
+  for (XMLElement *child = robot.FirstChildElement(), *next = nullptr; child; child = next) {
+    next = child->NextSiblingElement();
+    const std::string tag = child->Name();
+    if (tag == "link") {
+      child->DeleteChildren();
+    } else if (tag != "joint") {
+      robot.DeleteChild(child);
+    }
+  }
+  const HeardErrors errors;
+  return modelOf(document, errors);
+}
 
 UrdfText parseUrdf(const std::string& text, bool visuals) {
   UrdfText urdf;
@@ -158,15 +187,8 @@ UrdfText parseUrdf(const std::string& text, bool visuals) {
       robot.DeleteChild(child);
     }
   }
-  tinyxml2::XMLPrinter printer(nullptr, true);
-  document.Print(&printer);
-  HeardErrors errors;
-  try {
-    urdf.model = urdf::parseURDF(printer.CStr());
-  } catch (const std::exception& error) {
-    throw RobotTextError(error.what());
-  }
-  if (!urdf.model) throw RobotTextError(errors.said().empty() ? "the URDF reader refuses it" : errors.said());
+  const HeardErrors errors;
+  urdf.model = modelOf(document, errors);
   // Of a link it drops an element that it cannot read, and all that follow, and goes on.
   for (const auto& [name, link] : urdf.model->links_) {
     if (link->collision_array.size() == elements[name]) continue;

@@ -31,5 +31,7 @@ struct UrdfText {
 /// it: where these are wrong, surfaces are still where tf has them. visuals: of links without a collision element they
 /// are taken for that. Throws RobotTextError.
 UrdfText parseUrdf(const std::string& text, bool visuals = false);
+/// How its joints move, and nothing of what its links look like. Throws RobotTextError.
+urdf::ModelInterfaceSharedPtr parseJoints(const std::string& text);
 
 }  // namespace dccd

@@ -3,7 +3,8 @@
 //                                            sorted into "certainly one root" and "perhaps several", side by side;
 //   roots (exact_batch_roots-inl.h)          pieces with one root each; of each root (exact_batch_refine-inl.h) a few
 //                                            Halley steps, a bracket certified by signs, the inside test over it;
-//   subdivide (exact_batch_subdivide-inl.h)  what this leaves undecided, by intervals from left to right.
+//   sharpen (exact_batch_sharpen-inl.h)      of what this leaves undecided f anew, in pairs of doubles;
+//   subdivide (exact_batch_subdivide-inl.h)  these pairs by intervals from left to right.
 // With CERTIFIED false all bounds are zero and nothing is certified; the rest is the same.
 // No MulAdd, no reciprocal estimate: every target computes the same bits.
 #include "simd/exact_batch.h"
@@ -80,6 +81,7 @@ HWY_AFTER_NAMESPACE();
 #include "simd/exact_batch_refine-inl.h"
 #include "simd/exact_batch_reject-inl.h"
 #include "simd/exact_batch_roots-inl.h"
+#include "simd/exact_batch_sharpen-inl.h"
 #include "simd/exact_batch_subdivide-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -92,10 +94,12 @@ namespace HWY_NAMESPACE {
 template <bool CERTIFIED, BatchKind KIND>
 HWY_INLINE void runKind(const BatchInput& in, const BatchOutput& out) {
   BatchScratch scratch;
+  scratch.hard.input = &in;
   const double cells = static_cast<double>(std::uint64_t{1} << in.toc_bits);
   for (std::size_t first = 0; first < in.count; first += BATCH_BLOCK) {
     const std::size_t count = in.count - first < BATCH_BLOCK ? in.count - first : BATCH_BLOCK;
-    gather<KIND>(in, first, count, scratch.motion);
+    gather<KIND>(
+        in, [first](std::size_t j) { return first + j; }, count, RoundedDifference(), scratch.motion);
     for (std::size_t i = 0; i < count; i += lanes()) {
       rejectVector<CERTIFIED>(scratch, i, first + i, count - i, out);
       if (scratch.single.count + lanes() > BATCH_BLOCK) {

@@ -28,6 +28,18 @@
 // both and the coefficients themselves. (Two terms, of U V W and of max |fi|, would be a third less where f is small;
 // but each would stand in for the other where it matters, and no test could hold either.)
 //
+// f anew (exact_batch_sharpen-inl.h), where that error is too large. A difference D = h + l exactly, |l| <= eps |h|. "p
+// + q exactly" is an error-free transform (two-sum, Dekker's product).
+//   A product of pairs within X, Y: leading parts exactly, cross terms rounded, x.lo y.lo dropped: at most 8 eps^2 X Y,
+//     its trailing part at most 3 eps X Y. A sum of pairs: leading parts exactly; trailing parts L in all, and that of
+//     the leading parts' sum, at most eps S: eps (2 L + eps S); then the trailing part is at most eps S.
+//   n0 = u0 x v0: 2 * 8 + 2 * 6 + 2 = 30 eps^2 U V, |n0| <= 2 U V; m1 = u0 x v1 + u1 x v0: 2 * 30 + 2 * 4 + 4 = 72.
+//   F0 = n0.w0: 3 * (16 + 30) for the products, (2 * 12 + 4) + (2 * 10 + 6) for the sums: 192 eps^2 U V W; F3 likewise.
+//   F1 = m1.w0 + n0.w1: twice that for m1 and its own errors, 3 * (32 + 72) + 2 * 54 = 420, 192, and 2 * 36 + 18 for
+//     sums of both: 702; one coefficient f1 a third of it.
+//   BATCH_SHARP_VALUE is 4096 eps^2. Each F is rounded to one double, and what is computed of them errs by at most 9
+//   eps of the largest |fi|, as above; BATCH_SHARP is 32 eps of the largest |Fi|.
+//
 // The inside test evaluates, at one t = m, two-by-two minors q = x_i y_j - x_j y_i of vectors x, y out of {u, v, w}
 // with absolute bounds X, Y, on one coordinate plane:
 //   x(m) = fl(fl(x0 s) + fl(x1 m))                           1 + 1 + 1 = 3 factors, absolute value at most X
@@ -41,7 +53,8 @@
 //   q0 = x(a)_i y(a)_j - x(a)_j y(a)_i and q2 as above:     16 eps X Y
 //   2 q1 = fl(minor(x(a), y(b)) + minor(x(b), y(a))):        9 factors on 4 products: 36 eps X Y, 18 on q1
 //   sums of three: 2 eps (|n| + |B| + |C|) as above, twice that for 2 q1.
-// So 22 eps X Y for each coefficient, sums of minors to the sum of those.
+// So 22 eps X Y for each coefficient, sums of minors to the sum of those. On an axis a place is a sum of at most two
+// components at a or b, each within 4 eps of its size, and a gap a difference of two: 6 eps (U + V + W) at most.
 //
 // Underflow: the guard demands 2^-150 <= U, V, W <= 2^150, so that U V W >= 2^-450, while each of fewer than 200
 // operations that underflows errs by at most 2^-1075, multiplied later by at most one factor of U, V, W <= 2^150. No
@@ -53,7 +66,8 @@
 namespace dccd {
 namespace simd {
 
-using tolerance::BATCH_MINOR, tolerance::BATCH_SEPARATION, tolerance::BATCH_TIME, tolerance::BATCH_VALUE;
+using tolerance::BATCH_MINOR, tolerance::BATCH_SEPARATION, tolerance::BATCH_SHARP, tolerance::BATCH_SHARP_VALUE,
+    tolerance::BATCH_TIME, tolerance::BATCH_VALUE;
 constexpr double BATCH_SMALLEST = tolerance::BATCH_SMALLEST_M, BATCH_LARGEST = tolerance::BATCH_LARGEST_M;
 
 }  // namespace simd

@@ -14,6 +14,7 @@ constexpr int PATIENT_STEPS = 20;  ///< for those that MORE_STEPS left, and in s
 /// (VF) or of w x u (EE), the closed features meet iff
 ///   VF  B/n, C/n and (n-B-C)/n >= 0 (barycentric coordinates),
 ///   EE  B/n, C/n, (n-B)/n and (n-C)/n >= 0 (line parameters of both edges).
+/// Where n may be 0, as of parallel edges, two of these of opposite signs exclude a contact, too: see apartAlong().
 template <bool CERTIFIED, BatchKind KIND>
 HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& touches, M& misses) {
   const V s = hn::Sub(constant(1), x);
@@ -51,20 +52,23 @@ HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& t
     error_c = hn::Mul(hn::Mul(size_u, size_w), relative);
   }
   const M n_certain = hn::Gt(nn, error_n);
-  M all_inside = hn::And(isPositive<CERTIFIED>(b, error_b), isPositive<CERTIFIED>(c, error_c));
+  const M b_inside = isPositive<CERTIFIED>(b, error_b), c_inside = isPositive<CERTIFIED>(c, error_c);
+  M all_inside = hn::And(b_inside, c_inside), any_inside = hn::Or(b_inside, c_inside);
   M any_outside = hn::Or(isNegative<CERTIFIED>(b, error_b), isNegative<CERTIFIED>(c, error_c));
+  const auto take = [&](V value, V error) HWY_ATTR {
+    const M inside = isPositive<CERTIFIED>(value, error);
+    all_inside = hn::And(all_inside, inside);
+    any_inside = hn::Or(any_inside, inside);
+    any_outside = hn::Or(any_outside, isNegative<CERTIFIED>(value, error));
+  };
   if (KIND == BatchKind::VERTEX_FACE) {
-    const V a = hn::Sub(hn::Sub(nn, b), c), error_a = hn::Add(hn::Add(error_n, error_b), error_c);
-    all_inside = hn::And(all_inside, isPositive<CERTIFIED>(a, error_a));
-    any_outside = hn::Or(any_outside, isNegative<CERTIFIED>(a, error_a));
+    take(hn::Sub(hn::Sub(nn, b), c), hn::Add(hn::Add(error_n, error_b), error_c));
   } else {
-    const V nb = hn::Sub(nn, b), error_nb = hn::Add(error_n, error_b);
-    const V nc = hn::Sub(nn, c), error_nc = hn::Add(error_n, error_c);
-    all_inside = hn::And(all_inside, hn::And(isPositive<CERTIFIED>(nb, error_nb), isPositive<CERTIFIED>(nc, error_nc)));
-    any_outside = hn::Or(any_outside, hn::Or(isNegative<CERTIFIED>(nb, error_nb), isNegative<CERTIFIED>(nc, error_nc)));
+    take(hn::Sub(nn, b), hn::Add(error_n, error_b));
+    take(hn::Sub(nn, c), hn::Add(error_n, error_c));
   }
   touches = hn::And(n_certain, all_inside);
-  misses = hn::And(n_certain, any_outside);
+  misses = hn::And(hn::Or(n_certain, any_inside), any_outside);
 }
 
 /// Approximate root in [lo, hi] by `steps` Halley steps that fall back to bisection; |f'| and |f''|/2 where

@@ -16,6 +16,11 @@ HWY_INLINE void prefetchPair(const BatchInput& in, std::size_t pair) {
 }
 constexpr std::size_t PAIRS_AHEAD = 16;  ///< so far ahead vertices are fetched from memory
 
+struct RoundedDifference {
+  HWY_INLINE V operator()(V to, V from) const { return hn::Sub(to, from); }
+  double operator()(double to, double from) const { return to - from; }
+};
+
 #if DCCD_AVX512
 /// Columns 0, 1, 2 and 4, 5, 6 of eight rows, to planes from `to` and from `to_t1` on.
 HWY_INLINE void storeColumns(const V (&rows)[8], std::size_t at, BatchPlane* to, BatchPlane* to_t1) {
@@ -38,42 +43,43 @@ HWY_INLINE void storeColumns(const V (&rows)[8], std::size_t at, BatchPlane* to,
   store(hn::ConcatUpperUpper(d, later_even_26, even_26), to_t1[2], at);
 }
 
-/// Differences of pairs first .. first+count-1 as planes; the last vector is filled up with copies of the last pair. A
-/// vertex at both ends of the step is one vector.
-template <BatchKind KIND>
-HWY_INLINE void gather(const BatchInput& in, std::size_t first, std::size_t count, MotionBlock& block) {
+/// Differences of `count` pairs as planes, pair_at(j) the j-th in the batch; the last vector is filled up with copies
+/// of the last pair. A vertex at both ends of the step is one vector.
+template <BatchKind KIND, class PairAt, class Difference>
+HWY_INLINE void gather(const BatchInput& in, const PairAt& pair_at, std::size_t count, const Difference& difference,
+                       MotionBlock& block) {
   for (std::size_t j = 0; j < count; j += 8) {
     const std::uint32_t* quads[8];
     for (std::size_t lane = 0; lane < 8; ++lane) {
-      quads[lane] = in.quads[first + (j + lane < count ? j + lane : count - 1)];
-      prefetchPair(in, first + j + lane + PAIRS_AHEAD);
+      quads[lane] = in.quads[pair_at(j + lane < count ? j + lane : count - 1)];
+      prefetchPair(in, pair_at(j + lane + PAIRS_AHEAD));
     }
     for (int vector = 0; vector < 3; ++vector) {
       V rows[8];
       for (int lane = 0; lane < 8; ++lane) {
         const std::uint32_t to = quads[lane][ENDS<KIND>[vector][0]], from = quads[lane][ENDS<KIND>[vector][1]];
-        rows[lane] = hn::Sub(hn::Load(Tag(), in.vertices + std::size_t{8} * to),
-                             hn::Load(Tag(), in.vertices + std::size_t{8} * from));
+        rows[lane] = difference(hn::Load(Tag(), in.vertices + std::size_t{8} * to),
+                                hn::Load(Tag(), in.vertices + std::size_t{8} * from));
       }
       storeColumns(rows, j, block.motion + 3 * vector, block.motion + U_T1 + 3 * vector);
     }
   }
 }
 #else
-/// Differences of pairs first .. first+count-1 as planes; the last vector is filled up with copies of the last pair.
-/// Plain doubles: scattered stores beat gather instructions on most machines.
-template <BatchKind KIND>
-HWY_INLINE void gather(const BatchInput& in, std::size_t first, std::size_t count, MotionBlock& block) {
+/// The same in plain doubles: scattered stores beat gather instructions on most machines.
+template <BatchKind KIND, class PairAt, class Difference>
+HWY_INLINE void gather(const BatchInput& in, const PairAt& pair_at, std::size_t count, const Difference& difference,
+                       MotionBlock& block) {
   for (std::size_t j = 0; j < count; ++j) {
-    const std::uint32_t* quad = in.quads[first + j];
-    prefetchPair(in, first + j + PAIRS_AHEAD);
+    const std::uint32_t* quad = in.quads[pair_at(j)];
+    prefetchPair(in, pair_at(j + PAIRS_AHEAD));
     const double* x[4];
     for (int i = 0; i < 4; ++i) x[i] = in.vertices + std::size_t{8} * quad[i];
     for (int vector = 0; vector < 3; ++vector) {
       const double *to = x[ENDS<KIND>[vector][0]], *from = x[ENDS<KIND>[vector][1]];
       for (int axis = 0; axis < 3; ++axis) {
-        block.motion[3 * vector + axis][j] = to[axis] - from[axis];
-        block.motion[U_T1 + 3 * vector + axis][j] = to[4 + axis] - from[4 + axis];
+        block.motion[3 * vector + axis][j] = difference(to[axis], from[axis]);
+        block.motion[U_T1 + 3 * vector + axis][j] = difference(to[4 + axis], from[4 + axis]);
       }
     }
   }

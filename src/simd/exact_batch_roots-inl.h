@@ -114,21 +114,21 @@ HWY_INLINE void writeOut(const RootBlock& roots, std::size_t j, double cells, co
 
 /// Leaves a pair to subdivision, which starts afresh; solves what is there when the block is full.
 template <BatchKind KIND>
-void subdivideAll(RootBlock& hard, double cells, const BatchOutput& out);
+void subdivideAll(HardBlock& hard, double cells, const BatchOutput& out);
 template <BatchKind KIND>
-HWY_INLINE void leave(const RootBlock& roots, std::size_t j, double cells, RootBlock& hard, const BatchOutput& out) {
+HWY_INLINE void leave(const RootBlock& roots, std::size_t j, double cells, HardBlock& hard, const BatchOutput& out) {
   copyPair(roots, j, hard, hard.count++);
   if (hard.count == BATCH_BLOCK) subdivideAll<KIND>(hard, cells, out);
 }
 
 /// Pairs with certainly one root in the step that fewer steps did not bracket.
 template <BatchKind KIND, int STEPS>
-HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out);
+HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, HardBlock& hard, const BatchOutput& out);
 
 /// Pairs with certainly one root in the step: with a few Halley steps, and more for those that these did not bring
 /// close.
 template <bool CERTIFIED, BatchKind KIND, int STEPS = QUICK_STEPS>
-HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+HWY_INLINE void solveSingle(RootBlock& roots, double cells, HardBlock& hard, const BatchOutput& out) {
   constexpr int NEXT_STEPS = STEPS < MORE_STEPS ? MORE_STEPS : PATIENT_STEPS;
   fillUp(roots);
   refine<CERTIFIED, KIND, true, STEPS>(roots, cells);
@@ -151,7 +151,7 @@ HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, con
 }
 
 template <BatchKind KIND, int STEPS>
-void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+void solveStubborn(RootBlock& roots, double cells, HardBlock& hard, const BatchOutput& out) {
   solveSingle<true, KIND, STEPS>(roots, cells, hard, out);
 }
 
@@ -205,7 +205,7 @@ HWY_INLINE void split(SplitBlock& roots, std::size_t i) {
 
 /// Pairs with perhaps several roots: one after the other, until one is a contact or none is left.
 template <bool CERTIFIED, BatchKind KIND>
-HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, HardBlock& hard, const BatchOutput& out) {
   if (roots.count == 0) return;
   fillUp(roots);
   for (std::size_t i = 0; i < roots.count; i += lanes()) split<CERTIFIED>(roots, i);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "simd/exact_batch.h"
+
 namespace dccd {
 namespace simd {
 
@@ -49,6 +51,12 @@ struct alignas(64) RootBlock {
   std::size_t count = 0;
 };
 
+/// Pairs that go on to subdivision, with what their coefficients are made of anew.
+struct HardBlock : RootBlock {
+  const BatchInput* input = nullptr;
+  MotionBlock rest;  ///< what rounding took from the differences
+};
+
 /// The same with the step split at the extrema of f.
 struct alignas(64) SplitBlock : RootBlock {
   alignas(64) BatchPlane end[4];  ///< 0, the two places, 1; without alignas it begins in the base's tail padding
@@ -72,12 +80,12 @@ struct FrontTable {
 };
 inline constexpr FrontTable FRONT_TABLE;
 
-/// All of it: about 80 kilobytes.
+/// All of it: about 90 kilobytes.
 struct BatchScratch {
   MotionBlock motion;
   RootBlock single;    ///< certainly one root in the whole step
   SplitBlock several;  ///< more than one sign change among the coefficients
-  RootBlock hard;      ///< not settled by these two; goes on to subdivision
+  HardBlock hard;      ///< not settled by these two; goes on to subdivision
 };
 
 }  // namespace simd

@@ -50,7 +50,28 @@ HWY_INLINE M apartAlong(V ua1, V ua2, V va1, V va2, V wa1, V wa2, V ub1, V ub2, 
   return hn::And(plus, minus);
 }
 
-/// The same along each axis.
+/// Whether the features are certainly apart on one axis at both ends of an interval, in the same order: their places on
+/// it are linear in t. What lies on one line at a time tells no more than this.
+template <BatchKind KIND>
+HWY_INLINE M apartOnAxis(V ua, V va, V wa, V ub, V vb, V wb, V error) {
+  constexpr bool VF = KIND == BatchKind::VERTEX_FACE;
+  const V zero = hn::Zero(Tag());
+  const auto gaps = [&](V u, V v, V w, V& above, V& below) HWY_ATTR {
+    if (VF) {
+      above = hn::Sub(w, hn::Max(zero, hn::Max(u, v)));
+      below = hn::Sub(hn::Min(zero, hn::Min(u, v)), w);
+    } else {
+      above = hn::Sub(hn::Add(w, hn::Min(zero, v)), hn::Max(zero, u));
+      below = hn::Sub(hn::Min(zero, u), hn::Add(w, hn::Max(zero, v)));
+    }
+  };
+  V above_a, below_a, above_b, below_b;
+  gaps(ua, va, wa, above_a, below_a);
+  gaps(ub, vb, wb, above_b, below_b);
+  return hn::Or(hn::Gt(hn::Min(above_a, above_b), error), hn::Gt(hn::Min(below_a, below_b), error));
+}
+
+/// The same in the projection along each axis, and on it.
 template <BatchKind KIND>
 HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
   const auto& m = pairs.motion;
@@ -60,19 +81,21 @@ HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
   const V error_n = hn::Mul(hn::Mul(size_u, size_v), relative);
   const V error_b = hn::Mul(hn::Mul(size_v, size_w), relative);
   const V error_c = hn::Mul(hn::Mul(size_u, size_w), relative);
+  const V error = hn::Mul(hn::Add(hn::Add(size_u, size_v), size_w), relative);
+  V ua[3], va[3], wa[3], ub[3], vb[3], wb[3];
+  for (int k = 0; k < 3; ++k) {
+    const V u0 = load(m[U_T0 + k], i), u1 = load(m[U_T1 + k], i), v0 = load(m[V_T0 + k], i);
+    const V v1 = load(m[V_T1 + k], i), w0 = load(m[W_T0 + k], i), w1 = load(m[W_T1 + k], i);
+    ua[k] = lerp(u0, u1, sa, a), va[k] = lerp(v0, v1, sa, a), wa[k] = lerp(w0, w1, sa, a);
+    ub[k] = lerp(u0, u1, sb, b), vb[k] = lerp(v0, v1, sb, b), wb[k] = lerp(w0, w1, sb, b);
+  }
   M result = hn::FirstN(Tag(), 0);
   for (int axis = 0; axis < 3; ++axis) {
     const int p = axis == 2 ? 0 : axis + 1, q = axis == 0 ? 2 : axis - 1;
-    const V up0 = load(m[U_T0 + p], i), up1 = load(m[U_T1 + p], i), uq0 = load(m[U_T0 + q], i);
-    const V uq1 = load(m[U_T1 + q], i), vp0 = load(m[V_T0 + p], i), vp1 = load(m[V_T1 + p], i);
-    const V vq0 = load(m[V_T0 + q], i), vq1 = load(m[V_T1 + q], i), wp0 = load(m[W_T0 + p], i);
-    const V wp1 = load(m[W_T1 + p], i), wq0 = load(m[W_T0 + q], i), wq1 = load(m[W_T1 + q], i);
-    const M along =
-        apartAlong<KIND>(lerp(up0, up1, sa, a), lerp(uq0, uq1, sa, a), lerp(vp0, vp1, sa, a), lerp(vq0, vq1, sa, a),
-                         lerp(wp0, wp1, sa, a), lerp(wq0, wq1, sa, a), lerp(up0, up1, sb, b), lerp(uq0, uq1, sb, b),
-                         lerp(vp0, vp1, sb, b), lerp(vq0, vq1, sb, b), lerp(wp0, wp1, sb, b), lerp(wq0, wq1, sb, b),
-                         error_n, error_b, error_c);
-    result = hn::Or(result, along);
+    const M along = apartAlong<KIND>(ua[p], ua[q], va[p], va[q], wa[p], wa[q], ub[p], ub[q], vb[p], vb[q], wb[p], wb[q],
+                                     error_n, error_b, error_c);
+    const M on = apartOnAxis<KIND>(ua[axis], va[axis], wa[axis], ub[axis], vb[axis], wb[axis], error);
+    result = hn::Or(result, hn::Or(along, on));
   }
   return result;
 }
@@ -122,10 +145,12 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
           hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
       free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
       result = choose(contact, outcome, result);
+      const M uncertain = hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
+      const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
+      if (!hn::AllFalse(d, uncertain)) free = hn::Or(free, hn::And(uncertain, apart<KIND>(pairs, i, lo, hi)));
       // What stays uncertain in a narrow bracket stays so in every interval around it.
-      const M stuck =
-          hn::And(hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN))),
-                  hn::Le(hn::Sub(load(pairs.root_hi, i), load(pairs.root_lo, i)), constant(NARROW_BRACKET)));
+      const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
+      const M stuck = hn::And(hn::AndNot(free, uncertain), narrow);
       result = choose(stuck, constant(ROOT_UNCERTAIN), result);
       kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);
       kept_hi = choose(contact, load(pairs.root_hi, i), kept_hi);
@@ -145,8 +170,9 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
 }
 
 template <BatchKind KIND>
-void subdivideAll(RootBlock& hard, double cells, const BatchOutput& out) {
+void subdivideAll(HardBlock& hard, double cells, const BatchOutput& out) {
   for (std::size_t j = hard.count; j % lanes() != 0; ++j) copyPair(hard, hard.count - 1, hard, j);
+  sharpen<KIND>(hard);
   for (std::size_t i = 0; i < hard.count; i += lanes()) subdivideVector<KIND>(hard, i, cells);
   for (std::size_t j = 0; j < hard.count; ++j) writeOut(hard, j, cells, out);
   hard.count = 0;

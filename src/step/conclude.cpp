@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -73,13 +74,31 @@ void keepEarliest(std::size_t count, Outcome& outcome) {
   outcome.patch_of.shrink_to_fit();
 }
 
+std::vector<bool> maskedOf(const Body& body) {
+  std::vector<bool> masked(body.topology->vertexCount());
+  for (const Index v : body.vertex_mask) masked.at(v) = true;
+  return masked;
+}
+
 /// Is every vertex on an edge or a face left out? Then nothing of the body was looked at.
 bool isMaskedWhole(const Body& body) {
   const std::vector<Index>& used = body.topology->usedVertices();
   if (body.vertex_mask.empty() || body.vertex_mask.size() < used.size()) return false;
-  std::vector<bool> masked(body.topology->vertexCount());
-  for (const Index v : body.vertex_mask) masked.at(v) = true;
+  const std::vector<bool> masked = maskedOf(body);
   return std::all_of(used.begin(), used.end(), [&](Index v) { return masked[v]; });
+}
+
+/// The first vertex whose position at an end is not finite: " (the first is 17 of 'cloth')". Empty: it is so in
+/// between.
+std::string firstLost(const Step& step) {
+  for (const Body& body : step.bodies) {
+    const std::vector<bool> masked = maskedOf(body);
+    for (const Index v : body.topology->usedVertices()) {
+      if (masked[v] || ((*body.t0)[v].allFinite() && (*body.t1)[v].allFinite())) continue;
+      return " (the first is " + std::to_string(v) + " of '" + body.name + "')";
+    }
+  }
+  return "";
 }
 
 /// What of the bodies was not looked at, counted; in words, or empty.
@@ -97,6 +116,7 @@ std::string takeUnchecked(const Step& step, StepStats& stats) {
     if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + (count == 1 ? one : many);
   };
   add(lost, " vertex is not finite and was not checked", " vertices are not finite and were not checked");
+  if (lost > 0) text += firstLost(step);
   add(dropped, " face was sent that cannot be used and was not checked",
       " faces were sent that cannot be used and were not checked");
   add(loose, " vertex belongs to no face and no edge and was not checked",
@@ -116,73 +136,91 @@ std::string waysInWords(const Step& step) {
   return text.str().empty() ? "a rigid body turns far" : text.str();
 }
 
-/// Why it is less than a whole answer, if it is. Reasons come in ascending order of weight, and the last one gives the
-/// status; each that stands in the way of a proof also goes into `unproved`.
-void judge(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
-  outcome.status = StepStatus::OK;
-  const auto say = [&](StepStatus status, const std::string& reason) {
-    outcome.status = status;
-    outcome.reason = reason;
-    // A list that is cut says nothing wrong about what touches, and all of it was looked at.
-    if (status != StepStatus::TRUNCATED) outcome.unproved.push_back(reason);
-  };
-  if (const std::string text = takeUnchecked(step, outcome.stats); !text.empty()) say(StepStatus::PARTIAL, text);
-  if (!step.off_path.empty()) say(StepStatus::PARTIAL, step.off_path);
-  if (outcome.contacts.size() < outcome.total_contacts) {
-    say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
-                                   std::to_string(outcome.total_contacts) + " contacts are listed");
-  }
+/// Why there was not time, or room, for all of it; empty: there was.
+std::string cutInWords(const Options& options, const Outcome& outcome) {
   const auto notBefore = [&] {  // rounded down, as the bound is
     const double toc = outcome.unchecked_toc_lower, millionths = std::floor(toc * 1e6);
     // The product may have been rounded up to a whole number; what fma() leaves has its true sign.
     const double below = std::fma(toc, 1e6, -millionths) < 0 ? millionths - 1 : millionths;
     return "nothing that was left out touches before toc " + std::to_string(below / 1e6);
   };
-  const std::string ran_out =
-      options.step_budget_ms > 0 ? "the step budget ran out" : "the time that a step may take without a budget ran out";
   if (outcome.cut) {
-    const std::string text = "at least " + std::to_string(outcome.total_contacts) +
-                             " contacts; the work was cut at the limit of what a step may find; " +
-                             (outcome.allPairs() ? "not all of the start state was looked at" : notBefore());
-    // Not by say(): unlike a list that is cut, this TRUNCATED means that not everything was looked at.
-    outcome.status = StepStatus::TRUNCATED;
-    outcome.reason = text;
-    outcome.unproved.push_back(text);
-  } else if (!outcome.complete && !outcome.allPairs()) {
-    say(StepStatus::DEADLINE, ran_out + "; " + notBefore());
-  } else if (!outcome.complete) {
-    say(StepStatus::DEADLINE,
-        ran_out + " before all of the start state was looked at; no pair was left out of the contacts");
+    return "at least " + std::to_string(outcome.total_contacts) +
+           " contacts; the work was cut at the limit of what a step may find; " +
+           (outcome.allPairs() ? "not all of the start state was looked at" : notBefore());
   }
-  if (outcome.substeps < needed_parts) {
-    say(StepStatus::PARTIAL,
-        waysInWords(step) + ", so that " +
-            (needed_parts == NO_NUMBER_OF_PARTS ? std::string("no number of equal parts follows it")
-                                                : std::to_string(needed_parts) + " parts are needed") +
-            "; max_substeps is " + std::to_string(outcome.substeps));
-  }
-  if (options.obstacle_expected && !step.map.surface) {
-    say(StepStatus::NO_MAP, step.map.problem + "; checked without it");
-  }
-  // None of these changes the status: the step was computed as it was asked for.
-  if (!step.map.own.doubt.empty()) outcome.unproved.push_back(step.map.own.doubt);
-  for (const Body& body : step.bodies) {
-    if (!isMaskedWhole(body)) continue;
-    outcome.unproved.push_back("vertex_mask names every vertex of body '" + body.name +
-                               "', so nothing of it was checked");
-  }
-  if (outcome.start_state == StartState::NOT_CHECKED && outcome.start_state_complete) {
-    outcome.unproved.push_back("whether surfaces cross at the start was not checked");
-  }
+  if (outcome.complete) return "";
+  return (options.step_budget_ms > 0 ? "the step budget ran out"
+                                     : "the time that a step may take without a budget ran out") +
+         (outcome.allPairs() ? " before all of the start state was looked at; no pair was left out of the contacts"
+                             : "; " + notBefore());
 }
 
-/// What nobody looked at. Where time or a limit left something out, that was said.
-void sayGaps(const Step& step, Outcome& outcome) {
-  if (outcome.claim.holds() || outcome.cut || !outcome.complete) return;
-  outcome.complete = false;
+std::string tooFewPartsInWords(const Step& step, std::size_t needed_parts, std::size_t parts) {
+  if (parts >= needed_parts) return "";
+  return waysInWords(step) + ", so that " +
+         (needed_parts == NO_NUMBER_OF_PARTS ? std::string("no number of equal parts follows it")
+                                             : std::to_string(needed_parts) + " parts are needed") +
+         "; at most " + std::to_string(parts) + " are allowed (raise rigid_tolerance_m)";
+}
+
+/// Answers what is asked of each step. Reasons for less than a whole answer come in ascending order of weight, and the
+/// last one gives the status.
+void judge(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
+  Claim& claim = outcome.claim;
+  outcome.status = StepStatus::OK;
+  const auto say = [&](StepStatus status, const std::string& reason) {
+    if (reason.empty()) return;
+    outcome.status = status;
+    outcome.reason = reason;
+  };
+  const auto answer = [&](Question question, StepStatus status, const std::string& why_not) {
+    say(status, why_not);
+    claim.answer(question, why_not);
+  };
+  answer(Question::CONTENTS, StepStatus::PARTIAL, takeUnchecked(step, outcome.stats));
+  answer(Question::WAYS, StepStatus::PARTIAL, step.off_path);
+  // A list that is cut says nothing wrong about what touches, and all of it was looked at.
+  if (outcome.contacts.size() < outcome.total_contacts) {
+    say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
+                                   std::to_string(outcome.total_contacts) + " contacts are listed");
+  }
+  answer(Question::TIME, outcome.cut ? StepStatus::TRUNCATED : StepStatus::DEADLINE, cutInWords(options, outcome));
+  answer(Question::PARTS, StepStatus::PARTIAL, tooFewPartsInWords(step, needed_parts, outcome.substeps));
+  const bool lacks_map = options.obstacle_expected && !step.map.surface;
+  answer(Question::MAP_IS_THERE, StepStatus::NO_MAP, lacks_map ? step.map.problem + "; checked without it" : "");
+  // None of these changes the status: the step was computed as it was asked for.
+  claim.answer(Question::MAP_IS_NO_BODY, step.map.own.doubt);
+  for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+    const Body& body = step.bodies[b];
+    claim.answer(Question::USABLE,
+                 isMaskedWhole(body)
+                     ? "vertex_mask names every vertex of body '" + body.name + "', so nothing of it was checked"
+                     : "",
+                 b);
+  }
+  const bool knows_start = outcome.start_state != StartState::NOT_CHECKED || !outcome.start_state_complete;
+  claim.answer(Question::START, knows_start ? "" : "whether surfaces cross at the start was not checked");
+  // Where time or a limit left something out, that was said.
+  if (!claim.isCovered()) outcome.complete = false;
+}
+
+/// "bodies 'cloth', 'pad'". Many links of a robot are counted: a list of 41 names hides what else is in it.
+std::string inWords(const std::vector<const Body*>& bodies) {
+  constexpr std::size_t MOST_LINKS = 3;
+  std::set<std::string> links;
+  for (const Body* body : bodies) links.insert(body->link);
+  links.erase("");
+  const bool are_counted = links.size() > MOST_LINKS;
   std::vector<std::string> names;
-  for (const Body& body : step.bodies) names.push_back(body.name);
-  for (std::string& sentence : outcome.claim.inWords(names)) outcome.unproved.push_back(std::move(sentence));
+  for (const Body* body : bodies) {
+    if (!are_counted || body->link.empty()) names.push_back("'" + body->name + "'");
+  }
+  std::string text;
+  if (!names.empty()) text = names.size() + are_counted == 1 ? "body " : "bodies ";
+  if (are_counted) names.push_back("the robot's " + std::to_string(links.size()) + " links");
+  for (const std::string& name : names) text += (&name == &names.front() ? "" : ", ") + name;
+  return text;
 }
 
 /// What was left out on request: whoever reads "proved" must see it.
@@ -195,14 +233,11 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
                        " vertices by vertex_mask");
   }
   const auto add = [&](const std::string& what, const auto& holds) {
-    std::string names;
-    std::size_t count = 0;
+    std::vector<const Body*> bodies;
     for (const Body& body : step.bodies) {
-      if (!holds(body) || body.topology->vertexCount() == 0) continue;
-      names.append(names.empty() ? "'" : ", '").append(body.name).append("'");
-      ++count;
+      if (holds(body) && body.topology->vertexCount() > 0) bodies.push_back(&body);
     }
-    if (count > 0) excluded.push_back((count == 1 ? "body " : "bodies ") + names + ": " + what);
+    if (!bodies.empty()) excluded.push_back(inWords(bodies) + ": " + what);
   };
   add("not against itself", [](const Body& body) { return !body.self_collision && !body.rigid; });
   add("not against other bodies", [&](const Body& body) { return !body.against_bodies && others; });
@@ -252,6 +287,40 @@ double scale(double toc, std::size_t i, std::size_t n, double towards) {
   return std::clamp(exact ? fraction : std::nextafter(fraction, towards), 0.0, 1.0);
 }
 
+/// Orders vertices by where they are all through a step, and how well that is known: two that are equal go together.
+struct Places {
+  std::vector<const Positions*> at;  ///< at both ends, and where it is seen in between
+  const std::vector<double>* radius_m;
+
+  explicit Places(const Body& body) : at{body.t0.get(), body.t1.get()}, radius_m(body.radius_m.get()) {
+    for (const Waypoint& w : body.waypoints) {
+      if (w.positions) at.push_back(w.positions.get());
+    }
+  }
+  bool isFinite(Index v) const {
+    return std::all_of(at.begin(), at.end(), [&](const Positions* p) { return (*p)[v].allFinite(); });
+  }
+  bool operator()(Index a, Index b) const {
+    for (const Positions* p : at) {
+      const Vec3 &x = (*p)[a], &y = (*p)[b];
+      if (x != y) return std::lexicographical_compare(x.data(), x.data() + 3, y.data(), y.data() + 3);
+    }
+    return radius_m && (*radius_m)[a] < (*radius_m)[b];
+  }
+};
+
+/// Vertices that are looked at, of those that go together one.
+std::set<Index, Places> placesLookedAt(const Body& body) {
+  const Places places(body);
+  std::set<Index, Places> found(places);
+  std::vector<bool> masked(body.topology->vertexCount());
+  for (const Index v : body.vertex_mask) masked.at(v) = true;
+  for (const Index v : body.topology->usedVertices()) {
+    if (!masked[v] && places.isFinite(v)) found.insert(v);
+  }
+  return found;
+}
+
 }  // namespace
 
 std::uint64_t looseVertices(const Body& body) {
@@ -261,7 +330,13 @@ std::uint64_t looseVertices(const Body& body) {
   std::vector<bool> accounted(topology.vertexCount());
   for (const Index v : topology.usedVertices()) accounted[v] = true;
   for (const Index v : body.vertex_mask) accounted.at(v) = true;
-  return static_cast<std::uint64_t>(std::count(accounted.begin(), accounted.end(), false));
+  if (std::all_of(accounted.begin(), accounted.end(), [](bool is) { return is; })) return 0;
+  const std::set<Index, Places> looked_at = placesLookedAt(body);
+  std::uint64_t loose = 0;
+  for (Index v = 0; v < accounted.size(); ++v) {
+    if (!accounted[v] && !(looked_at.key_comp().isFinite(v) && looked_at.count(v) > 0)) ++loose;
+  }
+  return loose;
 }
 
 double scaleDown(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 0.0); }
@@ -315,7 +390,6 @@ void conclude(const Options& options, const Step& step, std::size_t needed_parts
   countContacts(outcome);
   keepEarliest(options.max_contacts, outcome);
   judge(options, step, needed_parts, outcome);
-  sayGaps(step, outcome);
   outcome.stats[Effect::OWN_VOXELS].in = step.map.own.looked_at;
   outcome.stats[Effect::OWN_VOXELS].out = step.map.own.own + step.map.own.doubted;
   outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);

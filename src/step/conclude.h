@@ -21,8 +21,8 @@ void joinParts(std::vector<Contact>& contacts);
 /// What of the raw contacts is reported, and what the step may be called.
 void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome);
 
-/// Vertices that were sent but belong to no face and no edge, except masked ones. Beside a rigid body's surface, as
-/// mesh files may have them, they do not matter.
+/// Vertices that were sent but belong to no face and no edge, except masked ones, and those that are all through the
+/// step where one that is looked at is. Beside a rigid body's surface, as mesh files may have them, they do not matter.
 std::uint64_t looseVertices(const Body& body);
 
 /// Throws std::invalid_argument unless the rung can hold a distance; `what` asks for one.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <sstream>
 
 #include "dccd/tolerances.h"
 #include "step/clearance/clearance_finder.h"
@@ -81,6 +82,8 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
   Outcome outcome;
+  outcome.claim.ask(step.bodies.size());
+  unsure_.assign(step.bodies.size(), 0);
   const std::size_t needed = countParts(step, options, scene, outcome.stats);
   const std::size_t parts = partsAllowed(needed, options.max_substeps);
   outcome.start_ns = step.start_ns;
@@ -95,7 +98,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   const std::size_t hits = outcome.contacts.size();
   prepared.expected.mark(outcome);
   if (options.patches) findPatches(outcome);
-  prepared.left_out.sayForNoise(step, options, scene, outcome.unproved);
+  answerNeighbours(step, outcome.claim);
   conclude(options, step, needed, outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) measureHits(hits, outcome.stats);
@@ -108,6 +111,21 @@ void History::Impl::measureHits(std::size_t hits, const StepStats& stats) {
   const double after_ms = std::max(0.0, msSince(hits_done_) - others_ms);
   const double measured_ns = std::min(MOST_NS_PER_HIT, 1.5e6 * after_ms / static_cast<double>(hits));
   per_hit_ = std::max(per_hit_ * 7 / 8, std::chrono::nanoseconds(static_cast<std::int64_t>(measured_ns)));
+}
+
+void History::Impl::answerNeighbours(const Step& step, Claim& claim) const {
+  for (std::size_t b = 0; b < unsure_.size(); ++b) {
+    std::string why_not;
+    if (unsure_[b]) {
+      const Body& body = step.bodies[b];
+      std::ostringstream text;
+      text << "body '" << body.name << "': some of its own features are as close as its uncertainty (radii of up to "
+           << *std::max_element(body.radius_m->begin(), body.radius_m->end())
+           << " m) reaches, and so they are in its reference frame; whether they touch is not known";
+      why_not = text.str();
+    }
+    claim.answer(Question::NEIGHBOURS, why_not, b);
+  }
 }
 
 void History::Impl::findPatches(Outcome& outcome) {
@@ -178,10 +196,12 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
     addPart(index, count, looked_.gaps(step.bodies, false, false), result, outcome);
     return;
   }
-  result.stats.left_out_listed = prepared.left_out.list.size();
   pairs.run(part, self_tests, scene, looked_, result);
   hits_done_ = Clock::now();
   pairs.collect(part, result);
+  if (!result.cut) {  // what was looked at beyond the limit depends on the threads, and nothing is proved
+    for (const PairWorker& worker : pairs.workers()) worker.markUnsure(unsure_);
+  }
   const bool all_pairs = result.complete && looked_.gaps(step.bodies, false, false).empty();
   const bool has_map = prepared.map.surface != nullptr;
   const bool map_is_whole = !has_map || !scene.mayMeetMap() || map_search.run(part, carried.map, looked_, result);

@@ -96,7 +96,7 @@ std::string notSolid(const EffectScene& scene) {
   for (const Body& body : scene.bodies) {
     if (!body.rigid || !body.topology || !body.topology->hasFaces() || body.shell || !body.against_bodies) continue;
     const bool sewn = body.t0 && !seamsOf(*body.topology, *body.t0, *body.t0).vertices.empty();
-    if (!body.topology->isClosed() && !sewn) {
+    if (!body.topology->isClosed() && !sewn && openFaces(*body.topology).empty()) {
       append(border, ", ", body.name);
     } else if (!body.vertex_mask.empty()) {
       append(mask, ", ", body.name);
@@ -126,12 +126,6 @@ Finding unknownSpace(const EffectScene& scene) {
   return wanted("unknown_space is not free");
 }
 
-std::string leftOut(const EffectScene& scene) {
-  if (scene.left_out_pairs == 0) return "";
-  return "; " + std::to_string(scene.left_out_pairs) +
-         " pairs of a body's own features are closer in its reference frame and left out of it";
-}
-
 /// The largest separations of the pairs that meet, of each kind of pair [m].
 struct CarriedSeparations {
   double own_m = 0;     ///< of a body from itself
@@ -156,9 +150,7 @@ Finding minimumSeparation(const EffectScene& scene) {
   if (!(largestSeparation(scene.bodies) > 0)) return impossible("minimum_separation_m is 0; set it above");
   const CarriedSeparations carried = carriedSeparations(scene.bodies);
   const double largest_m = std::max({carried.own_m, carried.bodies_m, scene.map_used ? carried.map_m : 0});
-  if (largest_m > 0) {
-    return wanted("contacts are reported from " + metres(largest_m) + " m" + (carried.own_m > 0 ? leftOut(scene) : ""));
-  }
+  if (largest_m > 0) return wanted("contacts are reported from " + metres(largest_m) + " m");
   if (carried.map_m > 0) return idle("only pairs with the map carry a separation, but there is no map");
   return idle("a separation is set, but no pair that is tested carries it");
 }
@@ -173,19 +165,16 @@ bool meetsAnotherBody(const std::vector<Body>& bodies, std::size_t b) {
 Finding trackerNoise(const EffectScene& scene) {
   const std::vector<Body>& bodies = scene.bodies;
   std::string carried;
-  bool any = false, any_own = false, any_map = false;
+  bool any = false, any_map = false;
   for (std::size_t b = 0; b < scene.noise.size(); ++b) {
     if (scene.noise[b].empty()) continue;
     any = true;
     any_map = any_map || meetsMap(bodies[b]);
     if (!meetsItself(bodies[b]) && !meetsAnotherBody(bodies, b) && !(meetsMap(bodies[b]) && scene.map_used)) continue;
-    any_own = any_own || meetsItself(bodies[b]);
     append(carried, "; ", bodies[b].name + ": " + scene.noise[b]);
   }
   if (!any) return impossible("no body has an uncertainty; give one under uncertainty");
-  if (!carried.empty()) {
-    return wanted("vertices are only known to a radius (" + carried + ")" + (any_own ? leftOut(scene) : ""));
-  }
+  if (!carried.empty()) return wanted("vertices are only known to a radius (" + carried + ")");
   if (any_map) return idle("bodies with an uncertainty meet nothing but the map, and there is no map");
   return idle("no body with an uncertainty meets anything");
 }

@@ -22,7 +22,6 @@ History::History(History&& other) noexcept = default;
 History& History::operator=(History&& other) noexcept = default;
 void History::clear() { impl_->carried.clear(); }
 bool History::isClear() const { return impl_->carried.isClear(); }
-const std::vector<LeftOutPair>& History::leftOut() const { return impl_->prepared.left_out.list; }
 
 void Carried::clear() {
   end.clear();
@@ -58,6 +57,7 @@ void Carried::rememberApart(const SceneArrays& scene, const std::vector<Contact>
 /// What throws may leave half of it made: what follows from options and map is made anew, and from bodies, where
 /// these were not done. Nothing is carried over.
 void History::Impl::forgetPrepared() noexcept {
+  if (!prepared.bodies_known) scene.forgetBodies();
   carried.clear();
   prepared.options.reset();  // so that all that follows from them is made, too
   prepared.map.clear();
@@ -85,7 +85,7 @@ void History::Impl::setOptions(const Options& wanted) {
   prepared.elementary = makeRung(wanted.accuracy);
   prepared.threads.set(wanted.num_threads);
   scene.setKeepBounds(wanted.keep_bounds);
-  map_search.forget();
+  map_search.keepBodies(0);
   carried.map.clear();
   prepared.expected_known = false;
   prepared.map.clear();  // other boxes may be excluded
@@ -96,15 +96,14 @@ void History::Impl::setBodies(const Step& step) {
   check(*prepared.options, step.bodies);
   if (prepared.bodies_known && scene.holds(step.bodies)) return;
   prepared.bodies_known = false;
-  if (clearance) clearance->forgetBodies();
   carried.clear();
-  carried.start_state.forgetBodies();
-  carried.inside.forgetBodies();
-  scene.setBodies(step.bodies);
-  self_tests.setBodies(scene.bodies());
-  map_search.forget();
+  const std::size_t held = scene.setBodies(step.bodies);
+  if (clearance) clearance->forgetBodies();
+  carried.start_state.keepBodies(held);
+  carried.inside.keepBodies(held);
+  self_tests.setBodies(scene.bodies(), held);
+  map_search.keepBodies(held);
   prepared.expected_known = false;
-  prepared.left_out.find(step, prepared, scene, pairs);
   prepared.bodies_known = true;
 }
 

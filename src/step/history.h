@@ -12,7 +12,6 @@
 #include "proof/looked.h"
 #include "step/expected_contacts.h"
 #include "step/map.h"
-#include "step/pairs/left_out.h"
 #include "step/pairs/pair_search.h"
 #include "step/pairs/self_tests.h"
 #include "step/patches/patches.h"
@@ -29,7 +28,6 @@ struct Prepared {
   std::optional<Options> options;
   std::unique_ptr<Rung> elementary;
   Threads threads;
-  LeftOut left_out;
   ReducedMap map;
   ExpectedContacts expected;
   bool bodies_known = false;    ///< what follows from bodies is of those that the scene holds
@@ -106,6 +104,7 @@ struct History::Impl {
   bool fill(const Part& part, StepStats& stats);
   void findClearance(const Part& part, Findings& result);
   void findPatches(Outcome& outcome);
+  void answerNeighbours(const Step& step, Claim& claim) const;
   void measureHits(std::size_t hits, const StepStats& stats);
 
   /// One and a half times what a hit took after the pairs, in the last steps that had many.
@@ -113,6 +112,7 @@ struct History::Impl {
   Deadline::Clock::time_point hits_done_;      // when the last part's pairs ended
   Deadline::Clock::duration patches_took_{0};  // in the last step
   std::vector<std::uint8_t> bounded_;          // per body: it needs bounds, whatever is near
+  std::vector<std::uint8_t> unsure_;           // per body: PairWorker::markUnsure(), in any part of the step
   Looked looked_;                              // of the part
 };
 

@@ -40,8 +40,8 @@ struct MapAnswer {
 
 class MapSearch {
  public:
-  /// Options or bodies change.
-  void forget() { checks_.clear(); }
+  /// Options change, or the bodies but for the first ones.
+  void keepBodies(std::size_t count) { checks_.resize(std::min(checks_.size(), count)); }
   /// Adds what the bodies touch; known: of bodies that do not move it is taken from there, and kept there. Where the
   /// deadline ends it, the result is not complete and its bound on what was left out is 0. looked: of which bodies all
   /// was looked at. False: not of all.

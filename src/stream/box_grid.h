@@ -12,7 +12,7 @@ namespace dccd {
 class BoxGrid {
  public:
   /// Of `count` boxes; boxOf(i) has `lo` and `hi`, indexed by axis, of finite numbers. Cells are this wide, or wider
-  /// where there would be too many.
+  /// where there would be too many of them, or too many of them would list a box.
   template <class BoxOf>
   void build(std::size_t count, double cell_m, BoxOf boxOf) {
     lo_.fill(1e300);
@@ -27,11 +27,18 @@ class BoxGrid {
     first_.clear();
     listed_.clear();
     if (count == 0) return;
-    constexpr double MOST_CELLS = 1 << 20;
+    const double most = 64.0 * static_cast<double>(count) + 4096;
     for (;; cell_m *= 2) {
       double cells = 1;
       for (int a = 0; a < 3; ++a) cells *= std::floor((hi_[a] - lo_[a]) / cell_m) + 1;
-      if (cells <= MOST_CELLS) break;
+      double listed = cells > most ? most + 1 : 0;
+      for (std::size_t i = 0; i < count && listed <= most; ++i) {
+        const auto& box = boxOf(i);
+        double its = 1;
+        for (int a = 0; a < 3; ++a) its *= std::min((box.hi[a] - box.lo[a]) / cell_m + 2, cells);
+        listed += its;
+      }
+      if (listed <= most || cells == 1) break;
     }
     inverse_cell_ = 1 / cell_m;
     for (int a = 0; a < 3; ++a) cells_[a] = static_cast<std::int64_t>((hi_[a] - lo_[a]) * inverse_cell_) + 1;
@@ -50,6 +57,14 @@ class BoxGrid {
     listed_.resize(first_.back());
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
     forEachCell([&](std::size_t i, std::size_t cell) { listed_[next[cell]++] = static_cast<std::uint32_t>(i); });
+  }
+
+  /// Whether the box that is around all of them meets this closed one.
+  bool meets(const double* lo, const double* hi) const {
+    for (int a = 0; a < 3; ++a) {
+      if (!(hi[a] >= lo_[a] && lo[a] <= hi_[a])) return false;
+    }
+    return true;
   }
 
   /// Whether test(i) is true of one of the boxes that meet this closed one, and maybe of some more. It may be asked
@@ -83,9 +98,9 @@ class BoxGrid {
   }
   template <class Test>
   bool anyCell(const double* lo, const double* hi, const Test& test) const {
+    if (!meets(lo, hi)) return false;
     std::array<std::int64_t, 3> low, high;
     for (int a = 0; a < 3; ++a) {
-      if (!(hi[a] >= lo_[a] && lo[a] <= hi_[a])) return false;
       low[a] = cellOf(lo[a], a);
       high[a] = cellOf(hi[a], a);
     }

@@ -82,7 +82,6 @@ double Monitor::stepMs() const {
   const double limit_ms = timeLimitMs(impl_->options.detector);
   return impl_->options.look_ahead_s > 0 ? (1 - tolerance::LOOK_AHEAD_SHARE) * limit_ms : limit_ms;
 }
-const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->history.leftOut(); }
 const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
 
 void Monitor::setOptions(const MonitorOptions& options) {
@@ -211,13 +210,13 @@ void Monitor::setBody(std::size_t body, Body what) {
   m.counters.resize(bodies.size());
   m.runs.resize(bodies.size());
   m.told_runs.resize(bodies.size());
-  m.references.frames.resize(bodies.size());
+  m.references.positions.resize(bodies.size());
   m.references.topologies.resize(bodies.size());
   m.stores.resize(bodies.size(), MeshStore(m.options.store));
   m.bodies = std::move(bodies);
   m.stores[body].clear();
   m.told_runs[body] = 0;
-  m.references.frames[body] = nullptr;
+  m.references.positions[body] = nullptr;
   m.references.topologies[body] = nullptr;
   m.forgetOwnVoxels(body);
 }
@@ -332,6 +331,7 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
     }
     m.tracker.tell(outcome);
     if (m.listener) m.listener->onOutcome(outcome);
+    if (m.options.in_cell) outcome.claim.askOfCell();
   } else {
     without(step.status, step.reason);
     if (step.status == StepStatus::DISABLED) m.followOwnVoxels(step.stamp_ns);

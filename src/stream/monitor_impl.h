@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <future>
 #include <map>
 #include <memory>
 #include <new>
@@ -23,6 +24,14 @@ namespace dccd {
 /// The body's mesh, and its way from where the one frame has it to where the other one does; they may be the same.
 void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body);
 
+/// The newest of so many maps without what is own, and how long that took. Nothing of the monitor's: what is made of it
+/// stays within the library.
+struct ToldMaps {
+  ObstacleMap map;
+  std::size_t count = 0;
+  double ms = 0;
+};
+
 struct Monitor::Impl {
   static Impl& of(Monitor& monitor) { return *monitor.impl_; }
 
@@ -35,9 +44,9 @@ struct Monitor::Impl {
     std::uint64_t sequence = 0;
     std::string reason;
   };
-  /// What the minimum separation measures neighbours in, one entry a body; frames are null where nothing is left out.
+  /// What neighbours are measured in, one entry a body; positions are null where nothing is left out.
   struct References {
-    std::vector<std::shared_ptr<const ReferenceFrame>> frames;
+    std::vector<std::shared_ptr<const Positions>> positions;
     std::vector<std::shared_ptr<const Topology>> topologies;
   };
 
@@ -54,6 +63,7 @@ struct Monitor::Impl {
   std::uint64_t map_number = 0;          // of the last one that came
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;              // of the step that is made
+  StampNs told_from_ns = 0;              // since when the bodies' ways are needed for the map that is told beside steps
   std::vector<std::string> thinned_out;  // of that step, in words
   const FrameTracks* tracks = nullptr;
   History history, side_history, doubt_history;  // of steps; of predictions and checks; of voxels in doubt
@@ -66,6 +76,7 @@ struct Monitor::Impl {
   std::atomic<bool> cancelled{false};
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
+  std::future<ToldMaps> telling;  // last, so that its end is waited for before anything that it reads is gone
 
   Impl(const MonitorOptions& o, std::vector<Body> b) : options(o), bodies(std::move(b)) {
     stores.assign(bodies.size(), MeshStore(options.store));
@@ -122,11 +133,18 @@ struct Monitor::Impl {
   bool separates(const Body& body) const;
   std::vector<TrackedBody> tracked() const;
   void takeMaps(StampNs known_until_ns);
+  /// What is told beside steps comes into force, if that is done.
+  void finishTelling();
+  void awaitTelling() const {
+    if (telling.valid()) telling.wait();
+  }
+  void tellBeside(std::size_t count, std::vector<TrackedBody> bodies_tracked);
   /// Outside of a step: what is own is followed, as far as the bodies' ways are known.
   void followOwnVoxels(StampNs stamp_ns);
   void limitMapsToCome();
   void forgetOwnVoxels(std::size_t body);
-  void takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked);
+  /// Whether it can be used together with the one that is trusted; else there is none.
+  bool fitsTrusted(const ObstacleMap& next);
   void settleDoubt(Step& step, const Deadline& deadline);
   StampNs wayNeededFrom(std::size_t body, StampNs stamp_ns) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;

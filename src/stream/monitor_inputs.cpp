@@ -12,10 +12,6 @@ std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
   return radius_m.empty() ? nullptr : share(std::move(radius_m));
 }
 
-double largest(const std::vector<double>& values) {
-  return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
-}
-
 }  // namespace
 
 void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to,
@@ -110,32 +106,24 @@ Step Monitor::Impl::place(const Pending& pending) {
 }
 
 void Monitor::Impl::forgetReferences() {
-  references.frames.assign(bodies.size(), nullptr);
+  references.positions.assign(bodies.size(), nullptr);
   references.topologies.assign(bodies.size(), nullptr);
 }
 
 /// A minimum separation, and a body's distance from itself, tell neighbours by a reference frame: the first one with
-/// this topology, or if no distance was asked for then (radii may come later), the first one for which it is. Radii
-/// that grow past those of the reference make a new list of left-out pairs; it is made for twice as large ones, so that
-/// this happens seldom.
+/// this topology, or if no distance was asked for then (radii may come later), the first one for which it is.
 void Monitor::Impl::keepReferences(Step& step, References& kept) const {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
     std::shared_ptr<const Topology>& topology = kept.topologies[b];
-    std::shared_ptr<const ReferenceFrame>& frame = kept.frames[b];
+    std::shared_ptr<const Positions>& at = kept.positions[b];
     if (!topology || (topology != body.topology && *topology != *body.topology)) {
       topology = body.topology;
-      frame = nullptr;
+      at = nullptr;
     }
     const bool needed = meetsItself(body) && (separates(body) || options.detector.clearance.self_m > 0);
-    if (needed && !frame) frame = share(ReferenceFrame{*body.t0, {}});
-    const double now_m = body.radius_m ? largest(*body.radius_m) : 0;
-    const double listed_m = frame ? largest(frame->radius_m) : now_m;
-    if (now_m > listed_m) {
-      std::vector<double> radius_m(body.t0->size(), std::max(now_m, 2 * listed_m));
-      frame = share(ReferenceFrame{frame->positions, std::move(radius_m)});
-    }
-    body.reference = frame;
+    if (needed && !at) at = body.t0;
+    body.reference = at;
   }
 }
 

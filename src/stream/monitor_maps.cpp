@@ -1,5 +1,6 @@
 // Which map a step has: the newest one whose own voxels can be told, with the one that is trusted.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iomanip>
 #include <limits>
@@ -59,6 +60,8 @@ void Monitor::setMap(ObstacleMap map) {
   m.map_number = std::max(m.map_number, map.number);
   const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface && !map.own.doubted_surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
+    m.awaitTelling();
+    m.telling = {};
     if (!map.problem.empty()) m.own_voxels.say(map.problem);
     m.maps_to_come.clear();
     if (as_it_is) m.own_voxels.forget();
@@ -75,7 +78,10 @@ void Monitor::setMap(ObstacleMap map) {
   }
 }
 
-void Monitor::sayOfMaps(const std::string& why) { impl_->own_voxels.say(why); }
+void Monitor::sayOfMaps(const std::string& why) {
+  impl_->awaitTelling();
+  impl_->own_voxels.say(why);
+}
 
 /// Of too many the oldest and the newest ones are kept.
 void Monitor::Impl::limitMapsToCome() {
@@ -84,6 +90,10 @@ void Monitor::Impl::limitMapsToCome() {
     for (const ObstacleMap& one : maps_to_come) bytes += one.surface->memoryBytes();
     return maps_to_come.size() > (bytes > MOST_BYTES_TO_COME ? FEWEST_MAPS_TO_COME : MOST_MAPS_TO_COME);
   };
+  if (isTooMuch()) {
+    awaitTelling();
+    finishTelling();
+  }
   while (isTooMuch()) {
     maps_to_come.erase(maps_to_come.begin() + 1);
     own_voxels.say("too many came between two frames of the bodies");
@@ -95,24 +105,72 @@ void Monitor::setMapBeside(ObstacleMap map) { impl_->trusted = std::move(map); }
 std::vector<TrackedBody> Monitor::Impl::tracked() const {
   std::vector<TrackedBody> tracked;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (ownsVoxels(bodies[b]))
-      tracked.push_back({static_cast<std::uint16_t>(b), bodies[b].name, bodies[b].own_voxels_m, &stores[b],
-                         !isStream(b), bodies[b].shell});
+    if (!ownsVoxels(bodies[b])) continue;
+    tracked.push_back({static_cast<std::uint16_t>(b), bodies[b].name, bodies[b].own_voxels_m, &stores[b], !isStream(b),
+                       bodies[b].shell, !bodies[b].link.empty()});
   }
   return tracked;
 }
 
 /// Until when the bodies' ways are known. Of several maps up to then each is looked at, and the newest is in force.
 void Monitor::Impl::takeMaps(StampNs known_until_ns) {
-  if (maps_to_come.empty() && std::any_of(bodies.begin(), bodies.end(), ownsVoxels)) return;
+  finishTelling();
+  if (telling.valid() || (maps_to_come.empty() && std::any_of(bodies.begin(), bodies.end(), ownsVoxels))) return;
   const std::vector<TrackedBody> bodies_tracked = tracked();
   std::size_t taken = maps_to_come.size();
   while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].stamp_ns > known_until_ns) --taken;
   if (bodies_tracked.empty()) own_voxels.forget();
   for (; taken > 0; --taken) {
-    takeMap(maps_to_come.front(), bodies_tracked);
+    const ObstacleMap& next = maps_to_come.front();
+    if (fitsTrusted(next)) {
+      if (options.own_voxels_beside && !bodies_tracked.empty()) return tellBeside(taken, bodies_tracked);
+      const auto start = Deadline::Clock::now();
+      map = own_voxels.reduce(next, trusted.surface.get(), bodies_tracked, options.own_voxels_lag_s,
+                              options.own_voxels_trust);
+      own_voxels_ms += msSince(start);
+    }
     maps_to_come.pop_front();  // should memory end before, the next step takes it
   }
+}
+
+/// By copies of the bodies' frames: which those are does not depend on how long it takes. All maps that can be told at
+/// once: else a node that has fallen behind would tell one from frame to frame, and never catch up.
+void Monitor::Impl::tellBeside(std::size_t count, std::vector<TrackedBody> bodies_tracked) {
+  std::vector<ObstacleMap> next;
+  while (next.size() < count && fitsTrusted(maps_to_come[next.size()])) next.push_back(maps_to_come[next.size()]);
+  told_from_ns = own_voxels.pathNeededFrom(next.front().stamp_ns, options.own_voxels_lag_s);
+  std::vector<MeshStore> frames;
+  frames.reserve(bodies_tracked.size());
+  for (TrackedBody& body : bodies_tracked) {
+    frames.push_back(*body.frames);
+    body.frames = &frames.back();  // there it stays when the vector moves
+  }
+  // Where there can be no thread the next step tells it.
+  telling =
+      std::async(std::launch::async | std::launch::deferred,
+                 [this, next = std::move(next), sure = trusted.surface, tracked = std::move(bodies_tracked),
+                  frames = std::move(frames), lag_s = options.own_voxels_lag_s, trust = options.own_voxels_trust] {
+                   const auto start = Deadline::Clock::now();
+                   ToldMaps told;
+                   try {
+                     for (const ObstacleMap& map : next) {
+                       told.map = own_voxels.reduce(map, sure.get(), tracked, lag_s, trust);
+                       ++told.count;
+                     }
+                   } catch (const std::bad_alloc&) {  // the others are told later
+                     if (told.count == 0) throw;
+                   }
+                   told.ms = msSince(start);
+                   return told;
+                 });
+}
+
+void Monitor::Impl::finishTelling() {
+  if (!telling.valid() || telling.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return;
+  ToldMaps told = telling.get();  // should memory have ended, the next step has it told again
+  map = std::move(told.map);
+  own_voxels_ms += told.ms;
+  maps_to_come.erase(maps_to_come.begin(), maps_to_come.begin() + static_cast<std::ptrdiff_t>(told.count));
 }
 
 void Monitor::Impl::followOwnVoxels(StampNs stamp_ns) try {
@@ -127,7 +185,7 @@ void Monitor::Impl::followOwnVoxels(StampNs stamp_ns) try {
   // The maps wait for the next one.
 }
 
-void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked) {
+bool Monitor::Impl::fitsTrusted(const ObstacleMap& next) {
   const VoxelSurface* sure = trusted.surface.get();
   // The one lattice of both is the live map's: a message has all digits of its resolution, a file's header six.
   if (sure && (trusted.frame_id != next.frame_id || !isSameLattice(*sure, *next.surface))) {
@@ -138,15 +196,15 @@ void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBo
     map = ObstacleMap();
     map.problem = problem.str();
     own_voxels.say(map.problem);
-    return;
+    return false;
   }
-  const auto start = Deadline::Clock::now();
-  map = own_voxels.reduce(next, sure, bodies_tracked, options.own_voxels_lag_s, options.own_voxels_trust);
-  own_voxels_ms += msSince(start);
+  return true;
 }
 
 /// From the next step on what was the body's own is an obstacle, as far as the map in force shows it.
 void Monitor::Impl::forgetOwnVoxels(std::size_t body) {
+  awaitTelling();
+  finishTelling();
   if (!own_voxels.forgetBody(static_cast<std::uint16_t>(body)) || !map.surface) return;
   const ObstacleMap before = std::exchange(map, ObstacleMap());  // should memory end, there is none until the next one
   map = own_voxels.reducedAnew(before, trusted.surface.get(), tracked(), options.own_voxels_trust);
@@ -168,6 +226,7 @@ void Monitor::Impl::settleDoubt(Step& step, const Deadline& deadline) {
 
 StampNs Monitor::Impl::wayNeededFrom(std::size_t body, StampNs stamp_ns) const {
   if (!ownsVoxels(bodies[body])) return stamp_ns;
+  if (telling.valid()) return std::min(stamp_ns, told_from_ns);
   const StampNs map_ns = maps_to_come.empty() ? stamp_ns : std::min(stamp_ns, maps_to_come.front().stamp_ns);
   return own_voxels.pathNeededFrom(map_ns, options.own_voxels_lag_s);
 }

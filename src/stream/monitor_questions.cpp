@@ -44,12 +44,19 @@ Outcome Monitor::checkNow() {
     m.trackOf(newest, newest, why);
     if (!why.empty()) m.sayUnknown("body '" + m.bodies[b].name + "'", why, step);
     m.lookForUnused(b, newest.stamp_ns, std::numeric_limits<StampNs>::max(), step);  // what came after it
+    const double apart_s = std::abs(secondsBetween(newest.stamp_ns, step.stamp_ns));
+    if (apart_s > m.options.store.max_step_s) {
+      m.sayUnknown("body '" + m.bodies[b].name + "'",
+                   "its newest frame is " + std::to_string(apart_s) + " s from that of the clock body", step);
+    }
     shown[b] = true;
   }
   m.sayUnshown(shown, step);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
   Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, Deadline().orWhen(m.cancelled));
+  if (m.options.in_cell) outcome.claim.askOfCell();
+  outcome.arrival_ns = m.stores[m.options.clock_body].newest().arrival_ns;
   if (m.options.detector.patches) m.tracker.recognise(History::Impl::of(m.side_history).patches, outcome);
   return outcome;
 }

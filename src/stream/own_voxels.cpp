@@ -2,235 +2,226 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <limits>
+#include <sstream>
 #include <utility>
 
-#include "base/next_surface.h"
 #include "dccd/tolerances.h"
+#include "obstacle/known_space_impl.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
+#include "stream/own_voxels_look.h"
 
 namespace dccd {
 namespace {
 
-std::uint64_t packed(const VoxelKey& key) {
-  return std::uint64_t{key.x} << 32 | std::uint64_t{key.y} << 16 | std::uint64_t{key.z};
-}
-
-/// Whether the map tells that the cube is free.
-bool isSeenFree(const KnownSpace* known, const LeafBox& box) {
-  if (!known) return true;
-  const Eigen::Map<const Vec3> lo(box.lo), hi(box.hi);
-  return known->isKnown({0.75 * lo + 0.25 * hi, 0.25 * lo + 0.75 * hi});  // its own voxels, not those it touches
-}
-
-VoxelTree treeOf(const std::unordered_map<std::uint64_t, OwnVoxel>& voxels) {
-  std::vector<OccupiedLeaf> leaves;
-  leaves.reserve(voxels.size());
-  for (const auto& one : voxels) leaves.push_back({one.second.key, 1});
-  return VoxelTree(leaves);
-}
-
-/// Calls visit(voxel) for the finest voxels of a cube within the box.
-template <class Visit>
-void visitVoxels(const OccupiedLeaf& cube, const KeyBox& box, Visit& visit) {
-  if (!meets(cube, box)) return;
-  if (cube.size == 1) return visit(cube);
-  for (const OccupiedLeaf& part : eighthsOf(cube)) visitVoxels(part, box, visit);
-}
+const VoxelTree NO_VOXELS{std::vector<OccupiedLeaf>()};
 
 StampNs nanoseconds(double s) { return static_cast<StampNs>(std::llround(s * 1e9)); }
-
-/// What the bodies' ways reach at most, in keys of the map; empty where no body is known.
-KeyBox reachedKeys(const ObstacleMap& map, const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& paths) {
-  Eigen::AlignedBox3d all;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    Eigen::AlignedBox3d reached;
-    bool turns = false;
-    const MeshFrame* last = nullptr;
-    for (const MeshStore::Stretch& stretch : paths[b]) {
-      turns = turns || stretch.to->rigid;
-      for (const MeshFrame* frame : {stretch.to.get(), stretch.from.get()}) {
-        if (std::exchange(last, frame) == frame) continue;  // where one stretch ends the next one begins
-        for (const Vec3& p : frame->positions) {
-          if (const Vec3 q = map.map_from_fixed * p; q.allFinite()) reached.extend(q);
-        }
-      }
-    }
-    if (reached.isEmpty()) continue;
-    // One that turns leaves the box of its ends by less than that one's diagonal.
-    const double more_m = bodies[b].reach_m + (turns ? reached.diagonal().norm() : 0);
-    all.extend(reached.min() - Vec3::Constant(more_m));
-    all.extend(reached.max() + Vec3::Constant(more_m));
-  }
-  if (all.isEmpty()) return {};
-  const Vec3 lo = all.min(), hi = all.max();
-  return VoxelSurface::Impl::of(*map.surface).keysOf(lo.data(), hi.data());
-}
-
-std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
-
-/// Sets the counts of what is own and what is in doubt, and a sentence of each, by body. missed: doubts_missed_.
-void describe(const std::vector<TrackedBody>& bodies, bool trust_first, const std::string& missed, OwnVoxels& own) {
-  for (const TrackedBody& body : bodies) {
-    std::uint64_t its = 0, doubted = 0;
-    for (const OwnVoxel& voxel : *own.voxels) {
-      if (voxel.body == body.body) ++(voxel.doubted ? doubted : its);
-    }
-    own.own += its;
-    own.doubted += doubted;
-    if (its > 0) {
-      own.excluded +=
-          (own.excluded.empty() ? "" : ", ") + countOf(its) + " of the map as own of body '" + body.name + "'";
-    }
-    if (doubted > 0) {
-      own.doubt += (own.doubt.empty() ? "" : ", ") + countOf(doubted) + " near body '" + body.name + "'";
-    }
-  }
-  if (trust_first && !own.excluded.empty()) own.excluded += ", by own_voxels_doubt: trust the first map's, too";
-  if (!own.doubt.empty()) {
-    own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
-    own.doubt += " there in the first map";
-    if (!missed.empty()) own.doubt += " after " + missed;
-    own.doubt +=
-        ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it "
-        "away once, or set own_voxels_doubt: trust";
-  }
-  const auto isSeen = [](const OwnVoxel& voxel) { return voxel.body == NOBODY; };
-  const auto seen = static_cast<std::uint64_t>(std::count_if(own.voxels->begin(), own.voxels->end(), isSeen));
-  if (seen == 0) return;
-  own.doubted += seen;
-  own.doubt += (own.doubt.empty() ? "the step touches one of " : "; or one of ") + countOf(seen) +
-               " in which a sensor saw something, but not often enough for an obstacle";
-}
 
 }  // namespace
 
 void OwnVoxelFinder::forget() {
   before_ = nullptr;
-  own_.clear();
+  known_before_ = nullptr;
+  stated_.clear();
+  known_.clear();
+  past_.clear();
+  unseen_.clear();
+  growth_.clear();
   remembered_.clear();
   seen_.clear();
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
   shapes_.erase(body);
-  const std::size_t before = own_.size();
-  for (auto one = own_.begin(); one != own_.end();) one = one->second.body == body ? own_.erase(one) : std::next(one);
-  return before_ && own_.size() < before;
-}
-
-StampNs OwnVoxelFinder::pathNeededFrom(StampNs now_ns, double lag_s) const {
-  // A map may be older than the one before it, after a clock that went back.
-  const StampNs longest_ns = now_ns - nanoseconds(tolerance::OWN_PATH_S);
-  return (before_ ? std::clamp(before_ns_, longest_ns, now_ns) : now_ns) - nanoseconds(lag_s);
-}
-
-std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns,
-                                            double lag_s) const {
-  std::vector<BodyWay> ways;
-  for (const TrackedBody& body : bodies) {
-    const MeshStore& frames = *body.frames;
-    if (frames.empty()) {
-      ways.emplace_back();
-    } else if (body.holds_always) {
-      ways.push_back({{frames.newestShared(), frames.newestShared(), 0, 0}});
-    } else {
-      // What a map older than all frames of the body shows is in doubt, not own: the first place will do.
-      const StampNs until_ns = std::max(stamp_ns, frames.oldest().stamp_ns);
-      ways.push_back(frames.pathWithin(pathNeededFrom(stamp_ns, lag_s), until_ns));
-    }
+  first_.erase(body);
+  last_frames_.erase(body);
+  known_.erase(body);
+  bool any = false;
+  for (auto one = stated_.begin(); one != stated_.end();) {
+    Stated& voxel = one->second;
+    const bool was_its = voxel.owners.has(body);
+    voxel.owners.removeIf([&](int owner) { return owner == body; });
+    any = any || was_its;
+    one = was_its && voxel.owners.empty() ? stated_.erase(one) : std::next(one);
   }
-  return ways;
+  return before_ && any;
 }
 
-/// The cubes of which it matters whether a body reached them. Forgets own voxels that the map shows no more, and what
-/// was in doubt by its maker: of that the new one is asked for, or taken over where no body is near.
-std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const ObstacleMap& map, const VoxelTree& sure,
-                                                    const KeyBox& region) {
-  const VoxelSurface& surface = *map.surface;
-  std::vector<ReachedCube> cubes;
-  const auto ask = [&](const OccupiedLeaf& leaf, ReachedCube::Why why) {
-    cubes.push_back({leaf, why, leafBox(leaf, surface.resolution()), -1});
-  };
-  const VoxelTree nothing{std::vector<OccupiedLeaf>()}, remembered(remembered_), own = treeOf(own_);
-  const VoxelTree &now = VoxelSurface::Impl::of(surface).tree,
-                  &before = before_ ? VoxelSurface::Impl::of(*before_).tree : nothing;
+/// What the map shows otherwise than the one before, and of all that has a state.
+void OwnVoxelFinder::listChanges(Look& look) {
+  using Why = ReachedCube::Why;
+  const VoxelTree &now = look.change.now, &before = look.change.before, remembered(remembered_);
+  std::vector<OccupiedLeaf> stated;
+  for (const auto& [key, voxel] : stated_) stated.push_back({voxel.key, 1});
+  const VoxelTree has_state(stated);
   auto appeared = [&](const OccupiedLeaf& voxel) {
-    if (cubes.size() < tolerance::MOST_OWN_ASKED) ask(voxel, ReachedCube::Why::APPEARED);
+    if (look.cubes.size() < tolerance::MOST_OWN_ASKED) look.ask(voxel, Why::APPEARED);
+  };
+  const KeyBox& region = look.mayBeNear() && before_ ? ALL_KEYS : look.region;
+  const auto take = [&](const OccupiedLeaf& part) {
+    const bool was_free = look.change.has_before && !unseen_.holds(part);
+    if (was_free && !isInside(part, region)) growth_.add(part, false, before_ns_, look.map.stamp_ns);
+    visitVoxels(part, region, appeared);
   };
   visitDifference(now, before, [&](const OccupiedLeaf& fresh) {
-    if (!meets(fresh, region)) return;
-    visitUncovered(sure, fresh, [&](const OccupiedLeaf& unsure) {
-      visitUncovered(remembered, unsure, [&](const OccupiedLeaf& part) { visitVoxels(part, region, appeared); });
+    visitUncovered(look.sure, fresh, [&](const OccupiedLeaf& unsure) {
+      visitUncovered(remembered, unsure, [&](const OccupiedLeaf& left) { visitUncovered(has_state, left, take); });
     });
   });
   visitDifference(before, now, [&](const OccupiedLeaf& gone) {
-    visitUncovered(own, gone, [&](const OccupiedLeaf& part) { ask(part, ReachedCube::Why::VANISHED); });
+    visitUncovered(has_state, gone, [&](const OccupiedLeaf& part) { look.ask(part, Why::VANISHED); });
   });
   for (const OccupiedLeaf& leaf : remembered_) {
-    visitUncovered(now, leaf, [&](const OccupiedLeaf& part) { ask(part, ReachedCube::Why::REMEMBERED); });
+    visitUncovered(now, leaf, [&](const OccupiedLeaf& part) { look.ask(part, Why::REMEMBERED); });
   }
-  for (auto one = own_.begin(); one != own_.end();) {
-    const OccupiedLeaf leaf{one->second.key, 1};
-    const bool shown = coverage(now, leaf) == VoxelTree::Coverage::FULL;
-    if (shown && one->second.doubted) ask(leaf, ReachedCube::Why::DOUBTED);
-    one = shown ? std::next(one) : own_.erase(one);
+  for (auto& [key, voxel] : stated_) {
+    const OccupiedLeaf leaf{voxel.key, 1};
+    voxel.shown = coverage(now, leaf) == VoxelTree::Coverage::FULL;
+    look.ask(leaf, Why::STATED, voxel.state == VoxelState::DOUBT ? BodySet() : look.groupsOf(voxel.owners));
   }
-  seen_.clear();
-  if (!map.own.doubted_surface) return cubes;
-  const std::size_t most = cubes.size() + tolerance::MOST_OWN_ASKED;
-  auto askSeen = [&](const OccupiedLeaf& voxel) {
-    if (!meets(voxel, region) || cubes.size() >= most) return seen_.push_back(voxel);
-    ask(voxel, ReachedCube::Why::SEEN);
-  };
-  for (const OccupiedLeaf& leaf : VoxelSurface::Impl::of(*map.own.doubted_surface).tree.leaves())
-    visitUncovered(sure, leaf, askSeen);
-  return cubes;
 }
 
-/// Says of each cube, by whether a body reached it, what it is from now on: own, in doubt, remembered or none of these.
-void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
-                            const std::set<int>& unknown_yet) {
-  std::vector<OccupiedLeaf> remembered;
-  for (const ReachedCube& cube : cubes) {
-    const bool reached = cube.body >= 0;
-    const std::uint64_t key = packed(cube.leaf.min);
-    switch (cube.why) {
-      case ReachedCube::Why::APPEARED:
-        if (reached)
-          own_[key] = {cube.leaf.min, static_cast<std::uint16_t>(cube.body),
-                       !trust_first && (!before_ || unknown_yet.count(cube.body) > 0)};
-        break;
-      case ReachedCube::Why::VANISHED:
-      case ReachedCube::Why::REMEMBERED:
-        if (reached || !isSeenFree(known, cube.box)) remembered.push_back(cube.leaf);
-        break;
-      case ReachedCube::Why::DOUBTED:
-        if (!reached) own_.erase(key);
-        if (reached && trust_first) own_[key].doubted = false;
-        break;
-      case ReachedCube::Why::SEEN:
-        if (!reached) seen_.push_back(cube.leaf);
-        break;
+/// What is in doubt for the map's maker.
+void OwnVoxelFinder::listSeen(Look& look) {
+  seen_.clear();
+  if (!look.map.own.doubted_surface) return;
+  const std::size_t most = look.cubes.size() + tolerance::MOST_OWN_ASKED;
+  auto askSeen = [&](const OccupiedLeaf& voxel) {
+    if (!meets(voxel, look.region) || look.cubes.size() >= most) return seen_.push_back(voxel);
+    look.ask(voxel, ReachedCube::Why::SEEN);
+  };
+  for (const OccupiedLeaf& leaf : VoxelSurface::Impl::of(*look.map.own.doubted_surface).tree.leaves())
+    visitUncovered(look.sure, leaf, askSeen);
+}
+
+void OwnVoxelFinder::appear(const ReachedCube& cube, Look& look) {
+  const bool was_free =
+      look.change.has_before && !unseen_.holds(cube.leaf) && look.unknown.count(packed(cube.leaf.min)) == 0;
+  const auto isNotYet = [&](int body) { return look.not_yet.count(body) > 0; };
+  BodySet owners = look.ownersOf(cube);
+  owners.removeIf(isNotYet);
+  VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
+  const bool on_trust = look.trust_first && !cube.near.empty() && (!was_free || isNotYet(*cube.near.begin()));
+  if (on_trust) state = VoxelState::OWN;
+  if (was_free && state != VoxelState::OWN)
+    growth_.add(cube.leaf, state == VoxelState::DOUBT, before_ns_, look.map.stamp_ns);
+  if (state == VoxelState::OBSTACLE) return;
+  if (owners.empty()) owners = cube.near;
+  if (owners.empty()) {
+    owners.add(static_cast<std::uint16_t>(look.seamed.empty() ? *look.lost.begin() : *look.seamed.begin()));
+  }
+  look.appeared.push_back({cube.leaf.min, state, owners});
+}
+
+/// Says of a cube, by who reached it, what it is from now on.
+void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
+  switch (cube.why) {
+    case ReachedCube::Why::APPEARED:
+      return appear(cube, look);
+    case ReachedCube::Why::VANISHED:
+    case ReachedCube::Why::REMEMBERED: {
+      const bool is_free =
+          look.change.isFree(cube.leaf) && nextState(VoxelState::OBSTACLE, look.free(cube, {})) == VoxelState::FREE;
+      if (!is_free) look.hidden.push_back(cube.leaf);
+      return;
+    }
+    case ReachedCube::Why::SEEN:
+      if (cube.near.empty()) seen_.push_back(cube.leaf);
+      return;
+    case ReachedCube::Why::STATED:
+      break;
+  }
+  const auto found = stated_.find(packed(cube.leaf.min));
+  Stated& voxel = found->second;
+  const BodySet owners = look.ownersOf(cube);
+  const VoxelEvent if_free = look.free(cube, owners);
+  // By a map without anything free no ray went there, and a body may hide it.
+  const bool may_hide = !look.change.known && voxel.state == VoxelState::DOUBT && if_free != VoxelEvent::FREE_ALONE;
+  const bool is_free = !voxel.shown && look.change.isFree(cube.leaf) && !may_hide;
+  voxel.state = nextState(voxel.state, is_free ? if_free : look.occupied(cube, owners));
+  if (voxel.state == VoxelState::OWN) {
+    voxel.owners = owners;
+  } else if (voxel.state == VoxelState::FREE || voxel.state == VoxelState::UNKNOWN ||
+             voxel.state == VoxelState::OBSTACLE) {
+    stated_.erase(found);
+  }
+}
+
+/// What appeared as own and touches what grew from outside is in doubt. Then all that appeared is stated, not before:
+/// should memory end, the same map comes again.
+void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody>& bodies,
+                                       const std::vector<BodyWay>& ways) {
+  std::vector<std::uint64_t> own;
+  for (const Stated& voxel : look.appeared) {
+    if (voxel.state == VoxelState::OWN) own.push_back(packed(voxel.key));
+  }
+  const StampNs now_ns = look.map.stamp_ns, since_ns = now_ns - nanoseconds(tolerance::OWN_GROWTH_S);
+  growth_.keep(look.change.now, look.change.before, since_ns, now_ns);
+  StampNs free_ns = std::numeric_limits<StampNs>::min();  // what grew on goes by what it grew from
+  std::vector<OccupiedLeaf> seeds = growth_.beside(own, true, free_ns);
+  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
+    if (cube.near.empty()) seeds.push_back(cube.leaf);
+  }
+  std::vector<std::uint64_t> grew = growth_.touched(own, seeds);
+  for (const std::uint64_t key : grew) growth_.add({unpacked(key), 1}, true, free_ns, now_ns);
+  std::sort(grew.begin(), grew.end());
+  for (Stated& voxel : look.appeared) {
+    const std::uint64_t key = packed(voxel.key);
+    if (std::binary_search(grew.begin(), grew.end(), key)) voxel.state = VoxelState::DOUBT;
+    stated_[key] = voxel;
+  }
+}
+
+/// Which of what the map before left out is UNKNOWN: a body was within reach of it at that look, and already at the
+/// last one that is a gap ago. What nobody looks at for no longer than that is free.
+std::vector<OccupiedLeaf> OwnVoxelFinder::unknownOf(std::vector<OccupiedLeaf> left_out, const Look& look) const {
+  if (past_.empty()) return left_out;
+  for (const PastLook* past : {&past_.back(), &past_.front()}) {
+    if (past->may_be_near) continue;
+    const std::vector<ReachedCube> asked = look.reached(left_out, past->bodies, past->ways);
+    left_out.clear();
+    for (const ReachedCube& cube : asked) {
+      if (!cube.near.empty()) left_out.push_back(cube.leaf);
     }
   }
-  remembered_ = std::move(remembered);  // at once: where memory ends before, the same map comes again
-  // One that was not looked at may have shown it free, or before the body came near.
-  if (!missed_.empty() && !trust_first) {
-    for (auto& one : own_) one.second.doubted = true;
-  }
-  const bool any_doubted = std::any_of(own_.begin(), own_.end(), [](const auto& one) { return one.second.doubted; });
-  if (!missed_.empty()) doubts_missed_ = missed_;
-  if (!any_doubted) doubts_missed_.clear();
+  return left_out;
 }
 
-/// Which maps came between the last one and this one, in words; empty: none. After a first one all is in doubt.
-std::string OwnVoxelFinder::missedBefore(const ObstacleMap& map) const {
-  if (!before_ || map.number <= number_ + 1) return "";
-  const std::uint64_t count = map.number - number_ - 1;
-  return std::to_string(count) + (count == 1 ? " that was" : " that were") + " not looked at (" +
-         (why_lost_.empty() ? "they come faster than they are used; send fewer" : why_lost_) + ")";
+void OwnVoxelFinder::listLeftOut(Look& look) const {
+  if (!look.change.known_before) return;
+  std::vector<OccupiedLeaf> left_out;
+  for (const ReachedCube& cube : look.cubes) {
+    const bool is_new = cube.why == ReachedCube::Why::APPEARED;
+    if (is_new && coverage(*look.change.known_before, cube.leaf) != VoxelTree::Coverage::FULL)
+      left_out.push_back(cube.leaf);
+  }
+  for (const OccupiedLeaf& leaf : unknownOf(std::move(left_out), look)) look.unknown.insert(packed(leaf.min));
+}
+
+void OwnVoxelFinder::askUnseen(Look& look, const std::vector<TrackedBody>& there,
+                               const std::vector<BodyWay>& ways_there) {
+  const StampNs gap_ago_ns = look.map.stamp_ns - nanoseconds(tolerance::OWN_GAP_S);
+  while (past_.size() > 1 && past_[1].stamp_ns <= gap_ago_ns) past_.pop_front();
+  listLeftOut(look);
+  std::vector<OccupiedLeaf> first_free = unseen_.firstFree(look.change, look.boxes, look.mayBeNear());
+  const auto hasState = [&](const OccupiedLeaf& leaf) { return leaf.size == 1 && stated_.count(packed(leaf.min)) > 0; };
+  first_free.erase(std::remove_if(first_free.begin(), first_free.end(), hasState), first_free.end());
+  std::vector<OccupiedLeaf> unseen = unknownOf(std::move(first_free), look);
+  std::vector<OccupiedLeaf> asked = unseen_.ask(look.change, look.boxes, look.mayBeNear(), std::move(unseen));
+  while (!asked.empty()) asked = unseen_.settle(look.reached(asked, there, ways_there));
+}
+
+std::string OwnVoxelFinder::gapBefore(const ObstacleMap& map) const {
+  std::ostringstream text;
+  text << secondsBetween(before_ns_, map.stamp_ns) << " s without a look";
+  if (map.number > number_ + 1) {
+    const std::uint64_t count = map.number - number_ - 1;
+    text << ", in which " << count << (count == 1 ? " map was" : " maps were") << " not looked at ("
+         << (why_lost_.empty() ? "they come faster than they are used; send fewer" : why_lost_) << ")";
+  }
+  return text.str();
 }
 
 ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies,
@@ -239,71 +230,62 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (TrackedBody& body : bodies) {
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
   }
-  missed_ = missedBefore(map);
-  const bool is_other = before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id);
-  if (is_other || remembered_.size() > MOST_REMEMBERED) forget();
-  const VoxelTree nothing{std::vector<OccupiedLeaf>()};
-  const VoxelTree& sure = trusted ? VoxelSurface::Impl::of(*trusted).tree : nothing;
-  const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
-  std::vector<ReachedCube> cubes = cubesToAsk(map, sure, reachedKeys(map, bodies, ways));
-  searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes, &shapes_);
-  std::set<int> unknown_yet;
-  for (const TrackedBody& body : bodies) {
-    const bool is_older = !body.holds_always && !body.frames->empty() && map.stamp_ns < body.frames->oldest().stamp_ns;
-    if (is_older) unknown_yet.insert(body.body);
+  endWhereItMoved(map, bodies);
+  std::size_t hidden = remembered_.size() + unseen_.size();
+  for (const auto& one : stated_) hidden += one.second.shown ? 0 : 1;
+  if (hidden > MOST_REMEMBERED) forget();
+
+  const double since_s = before_ ? secondsBetween(before_ns_, map.stamp_ns) : 0;
+  const bool is_blind = since_s < 0 || since_s > tolerance::OWN_PATH_S;
+  Look look{map,
+            {VoxelSurface::Impl::of(*map.surface).tree, before_ ? VoxelSurface::Impl::of(*before_).tree : NO_VOXELS,
+             map.known ? &KnownSpace::Impl::treeOf(*map.known) : nullptr,
+             known_before_ ? &KnownSpace::Impl::treeOf(*known_before_) : nullptr, before_ != nullptr},
+            trusted ? VoxelSurface::Impl::of(*trusted).tree : NO_VOXELS,
+            shapes_,
+            trust_first,
+            is_blind || since_s > tolerance::OWN_GAP_S,
+            is_blind};
+  const std::vector<BodyWay> ways = waysOf(bodies, map.stamp_ns, lag_s);
+  findSeams(look, bodies, lag_s);
+  std::vector<TrackedBody> there;
+  std::vector<BodyWay> ways_there;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!look.addBoxOf(bodies[b], ways[b])) continue;
+    there.push_back(bodies[b]);
+    ways_there.push_back(ways[b]);
   }
-  follow(cubes, map.known.get(), trust_first, unknown_yet);
+  listChanges(look);
+  listSeen(look);
+  searchReach(bodies, ways, map.map_from_fixed, resolution_m, look.cubes, &shapes_, look.is_gap);
+  askUnseen(look, there, ways_there);
+  for (const ReachedCube& cube : look.cubes) follow(cube, look);
+  remembered_ = std::move(look.hidden);
+  stateWhatAppeared(look, bodies, ways);
+  unseen_.keep();
+  if (before_ && look.is_gap) gap_ = gapBefore(map);
+  const auto isDoubted = [](const auto& one) { return one.second.state != VoxelState::OWN; };
+  if (std::none_of(stated_.begin(), stated_.end(), isDoubted)) gap_.clear();
+  for (const TrackedBody& body : bodies) {
+    const auto seen = body.frames->framesWithin(std::numeric_limits<StampNs>::min(), map.stamp_ns + 1);
+    if (!seen.empty()) last_frames_[body.body] = seen.back();
+  }
+  if (!before_) map_from_fixed_ = map.map_from_fixed;
+  past_.push_back({map.stamp_ns, std::move(there), std::move(ways_there), look.mayBeNear()});
   frame_id_ = map.frame_id;
   before_ = map.surface;
+  known_before_ = map.known;
   before_ns_ = map.stamp_ns;
+  if (map.number > number_ + 1) why_lost_.clear();
   number_ = map.number;
-  if (!missed_.empty()) why_lost_.clear();
 
   ObstacleMap next = map;
   next.own = OwnVoxels();
-  next.own.looked_at = static_cast<std::uint64_t>(std::count_if(
-      cubes.begin(), cubes.end(), [](const ReachedCube& cube) { return cube.why == ReachedCube::Why::APPEARED; }));
+  next.own.looked_at =
+      static_cast<std::uint64_t>(std::count_if(look.cubes.begin(), look.cubes.end(), [](const ReachedCube& cube) {
+        return cube.why == ReachedCube::Why::APPEARED;
+      }));
   return withoutOwn(std::move(next), trusted, bodies, trust_first);
-}
-
-ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelSurface* trusted,
-                                        const std::vector<TrackedBody>& bodies, bool trust_first) {
-  ObstacleMap map = reduced;
-  map.surface = before_;
-  map.own = OwnVoxels();
-  map.own.looked_at = reduced.own.looked_at;
-  return withoutOwn(std::move(map), trusted, bodies, trust_first);
-}
-
-ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trusted,
-                                       const std::vector<TrackedBody>& bodies, bool trust_first) {
-  const double resolution_m = map.surface->resolution();
-  const VoxelTree nothing{std::vector<OccupiedLeaf>()};
-  const VoxelTree& sure = trusted ? VoxelSurface::Impl::of(*trusted).tree : nothing;
-  std::vector<OwnVoxel> voxels;
-  for (const auto& one : own_) voxels.push_back(one.second);
-  std::sort(voxels.begin(), voxels.end(), [](const OwnVoxel& a, const OwnVoxel& b) { return a.key < b.key; });
-  for (const OccupiedLeaf& leaf : seen_) voxels.push_back({leaf.min, NOBODY, true});
-  std::vector<OccupiedLeaf> doubted;
-  for (const OwnVoxel& voxel : voxels) {
-    if (voxel.doubted) doubted.push_back({voxel.key, 1});
-  }
-  if (!doubted.empty()) map.own.doubted_surface = VoxelSurface::build(resolution_m, std::move(doubted));
-  map.own.voxels = share(std::move(voxels));
-  describe(bodies, trust_first, doubts_missed_, map.own);
-  if (!own_.empty() || trusted) {
-    std::vector<OccupiedLeaf> without = sure.leaves();
-    for (const auto& one : own_) {
-      visitUncovered(sure, {one.second.key, 1}, [&](const OccupiedLeaf& voxel) { without.push_back(voxel); });
-    }
-    const auto last = reduced_.lock();
-    const std::shared_ptr<const VoxelSurface> given = map.surface;
-    map.surface =
-        nextSurface(resolution_m, leavesWithout(VoxelSurface::Impl::of(*given).tree, VoxelTree(without), sure.leaves()),
-                    last ? *last : *given);
-  }
-  reduced_ = map.surface;
-  return map;
 }
 
 }  // namespace dccd

@@ -1,22 +1,17 @@
 // Which voxels of a map a tracked body accounts for: the sensor that made the map saw the body there, not an obstacle.
-//
-// The rule, voxel by voxel, from one map to the next:
-// 1. A voxel of a map that is trusted (octomap_file) is an obstacle.
-// 2. A voxel that was not occupied in the map before is own, if at some time between that map's stamp less the lag and
-//    this one's a body's surface was within own_voxels_m of it, or its middle was inside of a closed rigid one (no
-//    shell); else it is an obstacle.
-// 3. An obstacle stays one as long as maps show it; also where it comes back after it vanished within reach of a body,
-//    or without having been seen free.
-// 4. What is own stays own until a map does not show it.
-// 5. What the first map shows within reach, or one that is older than all that is known of the body, is in doubt: no
-//    obstacle, but no proof either of a step that touches it, until a map does not show it, or shows it with no body in
-//    reach, which makes it an obstacle. After maps that were not looked at all is in doubt that is not an obstacle.
-// 6. Where a body is gone, nothing is its own any more.
-// 7. A voxel in which the map's maker has seen something, but not often enough for an obstacle, is in doubt, unless a
-//    body's surface was within own_voxels_m of it at that time.
+// The rule is the table of stream/voxel_states.h, voxel by voxel from one map to the next. Beside it:
+// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h).
+// - A voxel of a map that is trusted (octomap_file) is an obstacle.
+// - Where a body is gone, nothing is its own any more.
+// - A voxel in which the map's maker has seen something, but not often enough for an obstacle, is in doubt, unless a
+//   body's surface was within own_voxels_m of it at that time.
+// What has no state here follows from the map before: what was occupied is an obstacle, what it showed as free is free,
+// and of what it left out nothing is known.
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -24,21 +19,24 @@
 #include <vector>
 
 #include "dccd/step.h"
+#include "stream/growth.h"
 #include "stream/reach_search.h"
+#include "stream/unseen_space.h"
+#include "stream/voxel_states.h"
 
 namespace dccd {
 
-/// OwnVoxel::body where a voxel is in doubt by (7). ObstacleMap::own.doubted_surface of a map that is given has these.
+/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these.
 constexpr std::uint16_t NOBODY = 0xffff;
 
 /// Not thread-safe.
 class OwnVoxelFinder {
  public:
   /// The map without what is own or in doubt, with what is trusted (null: nothing), and both in words. `trusted` has
-  /// the map's frame and resolution. Maps come in the order of their stamps; one of another
-  /// frame or resolution, or after forget(), is a first one, and so is one after which more than MOST_REMEMBERED
-  /// obstacles would be remembered. Where ObstacleMap::known does not tell, what is not
-  /// occupied counts as free. Bodies are known at the map's stamp; trust_first: what is in doubt is own.
+  /// the map's frame and resolution. Maps come in the order of their stamps. One of another frame or resolution, or
+  /// whose frame moved, or after forget(), is a first one, and so is one after which more than MOST_REMEMBERED cubes
+  /// would be remembered that it does not show. Where ObstacleMap::known does not tell, what is not occupied counts as
+  /// free. Bodies are known at the map's stamp; trust_first: what is first seen with a body near is its own.
   ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies, double lag_s,
                      bool trust_first);
   void forget();
@@ -57,28 +55,59 @@ class OwnVoxelFinder {
   static constexpr std::size_t MOST_REMEMBERED = std::size_t{1} << 18;
 
  private:
+  /// A voxel that is OWN, LEFT, LEFT_SEEN or in DOUBT.
+  struct Stated {
+    VoxelKey key;
+    VoxelState state;
+    BodySet owners;     // of what is in doubt: who was near, for the sentence
+    bool shown = true;  // the last map did
+  };
+  /// Of one map.
+  struct Look;
+  /// Bodies that were there, their ways up to it, and whether some other place of theirs was not known.
+  struct PastLook {
+    StampNs stamp_ns;
+    std::vector<TrackedBody> bodies;
+    std::vector<BodyWay> ways;
+    bool may_be_near;
+  };
+
+  void endWhereItMoved(const ObstacleMap& map, const std::vector<TrackedBody>& bodies);
   std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
-  std::vector<ReachedCube> cubesToAsk(const ObstacleMap& map, const VoxelTree& sure, const KeyBox& region);
-  std::string missedBefore(const ObstacleMap& map) const;
-  /// unknown_yet: bodies of which nothing is known as old as the map.
-  void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
-              const std::set<int>& unknown_yet);
+  void findSeams(Look& look, const std::vector<TrackedBody>& bodies, double lag_s);
+  void listChanges(Look& look);
+  void listSeen(Look& look);
+  void appear(const ReachedCube& cube, Look& look);
+  void follow(const ReachedCube& cube, Look& look);
+  std::vector<OccupiedLeaf> unknownOf(std::vector<OccupiedLeaf> left_out, const Look& look) const;
+  void listLeftOut(Look& look) const;
+  void askUnseen(Look& look, const std::vector<TrackedBody>& there, const std::vector<BodyWay>& ways_there);
+  void stateWhatAppeared(Look& look, const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways);
+  /// Which maps came between the last one and this one, in words.
+  std::string gapBefore(const ObstacleMap& map) const;
   /// The map without what is own or in doubt, with what is trusted.
   ObstacleMap withoutOwn(ObstacleMap map, const VoxelSurface* trusted, const std::vector<TrackedBody>& bodies,
                          bool trust_first);
 
-  std::shared_ptr<const VoxelSurface> before_;  // as it was given; null: none
+  std::shared_ptr<const VoxelSurface> before_;      // as it was given; null: none
+  std::shared_ptr<const KnownSpace> known_before_;  // null: what is not occupied there is free
   StampNs before_ns_ = 0;
   std::string frame_id_;
-  std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
-  std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
-  RigidShapes shapes_;                               // of bodies that have been asked about
-  std::vector<OccupiedLeaf> seen_;                   // by (7), of the last map
-  std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
-  std::uint64_t number_ = 0;                         // ObstacleMap::number of the last map
-  std::string why_lost_;                             // why one was lost since it, as far as somebody said so
-  std::string missed_;         // which came before the map that is looked at, after the last one; empty: none
-  std::string doubts_missed_;  // the same, where some doubt is for that reason
+  Eigen::Isometry3d map_from_fixed_ = Eigen::Isometry3d::Identity();  // of the first map
+  std::unordered_map<std::uint64_t, Stated> stated_;                  // by the voxel's packed key
+  std::deque<PastLook> past_;                                         // of the last OWN_GAP_S, and the one before these
+  UnseenSpace unseen_;
+  Growth growth_;
+  std::vector<OccupiedLeaf> remembered_;    // obstacles that the last map did not show, nor showed as free
+  std::map<std::uint16_t, StampNs> first_;  // of each body, its first frame that is known of
+  std::map<std::uint16_t, std::shared_ptr<const MeshFrame>> last_frames_;  // of each, not after the last map
+  std::set<std::uint16_t> known_;              // bodies whose way up to the last map was known
+  RigidShapes shapes_;                         // of bodies that have been asked about
+  std::vector<OccupiedLeaf> seen_;             // of the last map: in doubt for its maker
+  std::weak_ptr<const VoxelSurface> reduced_;  // of the map before, if it is still there
+  std::uint64_t number_ = 0;                   // ObstacleMap::number of the last map
+  std::string why_lost_;                       // why one was lost since it, as far as somebody said so
+  std::string gap_;                            // before the map that put some voxel in doubt; empty: none
 };
 
 }  // namespace dccd

@@ -58,13 +58,20 @@ struct FaceReach {
 
 class ReachSearch {
  public:
-  ReachSearch(std::vector<ReachedCube>& cubes, double resolution_m, RigidShapes* shapes)
-      : cubes_(cubes), resolution_m_(resolution_m), shapes_(shapes), left_(cubes.size()), asked_(cubes.size(), 0) {
+  ReachSearch(std::vector<ReachedCube>& cubes, double resolution_m, RigidShapes* shapes, bool whole_way)
+      : cubes_(cubes),
+        resolution_m_(resolution_m),
+        shapes_(shapes),
+        whole_way_(whole_way),
+        open_(cubes.size()),
+        places_of_(cubes.size()),
+        asked_(cubes.size()) {
     grid_.build(cubes.size(), 4 * resolution_m, [&](std::size_t i) -> const LeafBox& { return cubes[i].box; });
   }
 
   void search(const TrackedBody& body, const std::vector<MeshStore::Stretch>& path,
               const Eigen::Isometry3d& map_from_fixed) {
+    begin(body);
     double gone_m = std::numeric_limits<double>::infinity();  // since the last place at which it was asked
     for (std::size_t i = 0; i < path.size() && left_ > 0; ++i) {
       const MeshStore::Stretch* const older = i + 1 < path.size() ? &path[i + 1] : nullptr;
@@ -80,18 +87,48 @@ class ReachSearch {
       searchAlong(body, path[i], places, goes_on && places > 0 ? places - 1 : places, map_from_fixed);
       gone_m = !goes_on ? std::numeric_limits<double>::infinity() : places > 0 ? way_m / places : 0;
     }
+    for (std::size_t i = 0; whole_way_ && i < cubes_.size(); ++i) {
+      if (places_of_[i].count > 0 && places_of_[i].count == place_ - first_place_) cubes_[i].always.add(body.body);
+    }
   }
 
  private:
+  /// The last place at which a body reached the cube, and how many there were.
+  struct Places {
+    std::uint64_t last = 0, count = 0;
+  };
   std::vector<ReachedCube>& cubes_;
   double resolution_m_;
   RigidShapes* shapes_;
+  bool whole_way_;
   BoxGrid grid_;
-  std::size_t left_;
-  std::vector<std::uint64_t> asked_;  // per cube, the last place of a rigid body that came to it
-  std::uint64_t place_ = 0;
-  Positions at_, first_at_;
-  std::vector<Face> near_;  // findNear()
+  std::size_t left_ = 0;
+  std::vector<std::uint8_t> open_;    // per cube, whether it matters that this body reaches it; so many are left_
+  std::vector<Places> places_of_;     // of this body, where the whole way is asked for
+  std::vector<std::uint64_t> asked_;  // per cube, the last place that came to it
+  std::uint64_t place_ = 0, first_place_ = 0, question_ = 0;
+  Positions at_;
+  /// A face at the place that is asked for, and the last cube that came to it.
+  struct PlacedFace {
+    std::array<Vec3, 3> corners;
+    FaceReach reach;
+    std::uint64_t asked;
+  };
+  std::vector<PlacedFace> placed_;
+  BoxGrid placed_grid_;
+
+  void begin(const TrackedBody& body) {
+    left_ = 0;
+    first_place_ = place_;
+    for (std::size_t i = 0; i < cubes_.size(); ++i) {
+      const ReachedCube& cube = cubes_[i];
+      const bool needs_all = whole_way_ || cube.why == ReachedCube::Why::APPEARED || !cube.asked.empty();
+      const bool is_told = !needs_all && !cube.near.empty();
+      open_[i] = !is_told && (cube.asked.empty() || cube.asked.has(body.group()));
+      left_ += open_[i];
+      if (whole_way_) places_of_[i] = {};
+    }
+  }
 
   /// How far its points go.
   static double wayAlong(const MeshStore::Stretch& stretch) {
@@ -110,24 +147,22 @@ class ReachSearch {
     const MeshFrame &from = *stretch.from, &to = *stretch.to;
     RigidShape* const shape = to.rigid && shapes_ ? &(*shapes_)[body.body] : nullptr;
     const bool is_known = shape && to.topology->hasFaces() && shape->isOf(to, resolution_m_);
-    if (!to.rigid) findNear(body, stretch, map_from_fixed);
     for (int i = 0; i <= last && left_ > 0; ++i) {
-      const double u = places == 0 ? stretch.last : stretch.last + (stretch.first - stretch.last) * i / places;
+      ++place_;
       at_.resize(to.positions.size());
+      const double u = places == 0 ? stretch.last : stretch.last + (stretch.first - stretch.last) * i / places;
       if (!to.rigid) {
-        if (near_.empty()) return;
         interpolate(from.positions, to.positions, u, at_);
         for (Vec3& p : at_) p = map_from_fixed * p;
-        for (const Face& f : near_) ask(body, {at_[f[0]], at_[f[1]], at_[f[2]]});
+        askPlaced(body, *to.topology);
         continue;
       }
       const Eigen::Isometry3d map_from_body = map_from_fixed * interpolate(from.pose, to.pose, u);
       const Eigen::Isometry3d moved = map_from_body * to.pose.inverse();
       if (is_known && askRigid(body, to, *shape, map_from_body, moved)) continue;
       for (std::size_t v = 0; v < at_.size(); ++v) at_[v] = moved * to.positions[v];
-      const Topology& topology = *to.topology;
-      visitElements(topology, [&](const Face& f) { ask(body, {at_[f[0]], at_[f[1]], at_[f[2]]}); });
-      if (topology.isClosed() && !body.shell) askInside(body, topology);
+      askPlaced(body, *to.topology);
+      if (to.topology->isClosed() && !body.shell) askInside(body, *to.topology);
     }
   }
 
@@ -139,45 +174,44 @@ class ReachSearch {
     for (const Edge& e : topology.edges()) visit(Face{e[0], e[1], e[1]});
   }
 
-  /// Of a body whose points go straight: the faces that come to a cube on their way. Most of them do not.
-  void findNear(const TrackedBody& body, const MeshStore::Stretch& stretch, const Eigen::Isometry3d& map_from_fixed) {
-    const auto placed = [&](double u, Positions& at) {
-      at.resize(stretch.to->positions.size());
-      interpolate(stretch.from->positions, stretch.to->positions, u, at);
-      for (Vec3& p : at) p = map_from_fixed * p;
-    };
-    placed(stretch.first, first_at_);
-    placed(stretch.last, at_);
-    near_.clear();
-    visitElements(*stretch.to->topology, [&](const Face& f) {
-      Vec3 lo = at_[f[0]], hi = lo;
-      for (const Index v : f) {
-        lo = lo.cwiseMin(at_[v]).cwiseMin(first_at_[v]);
-        hi = hi.cwiseMax(at_[v]).cwiseMax(first_at_[v]);
-      }
-      const double more_m = body.reach_m + ROUNDING * (body.reach_m + lo.cwiseAbs().cwiseMax(hi.cwiseAbs()).maxCoeff());
-      lo.array() -= more_m;
-      hi.array() += more_m;
-      bool is_near = !lo.allFinite() || !hi.allFinite();  // a lost vertex may be there at one end of the way
-      grid_.visit(lo.data(), hi.data(), [&](std::uint32_t i) {
-        const LeafBox& box = cubes_[i].box;
-        is_near = is_near || (cubes_[i].body < 0 && box.lo[0] <= hi[0] && box.lo[1] <= hi[1] && box.lo[2] <= hi[2] &&
-                              box.hi[0] >= lo[0] && box.hi[1] >= lo[1] && box.hi[2] >= lo[2]);
-      });
-      if (is_near) near_.push_back(f);
-    });
-  }
-
-  void settle(ReachedCube& cube, const TrackedBody& body) {
-    cube.body = body.body;
+  void settle(std::uint32_t i, const TrackedBody& body) {
+    cubes_[i].near.add(body.body);
+    if (whole_way_) {
+      Places& places = places_of_[i];
+      places.count += std::exchange(places.last, place_) != place_;
+      return;
+    }
+    open_[i] = 0;
     --left_;
   }
 
-  void ask(const TrackedBody& body, const std::array<Vec3, 3>& t) {
-    FaceReach reach;
-    if (!reach.find(t, body.reach_m)) return;
-    grid_.visit(reach.lo, reach.hi, [&](std::uint32_t i) {
-      if (cubes_[i].body < 0 && reaches(t, reach, cubes_[i].box)) settle(cubes_[i], body);
+  /// Of a body at at_: each cube asks for the faces near it, until one reaches it. Most cubes are reached by the first.
+  void askPlaced(const TrackedBody& body, const Topology& topology) {
+    placed_.clear();
+    Eigen::AlignedBox3d bounds;
+    visitElements(topology, [&](const Face& f) {
+      PlacedFace face{{at_[f[0]], at_[f[1]], at_[f[2]]}, {}, 0};
+      FaceReach& reach = face.reach;
+      if (!reach.find(face.corners, body.reach_m) || !grid_.meets(reach.lo, reach.hi)) return;
+      bounds.extend(Eigen::Map<const Vec3>(reach.lo)).extend(Eigen::Map<const Vec3>(reach.hi));
+      placed_.push_back(face);
+    });
+    if (placed_.empty()) return;
+    placed_grid_.build(placed_.size(), 2 * resolution_m_,
+                       [&](std::size_t f) -> const FaceReach& { return placed_[f].reach; });
+    grid_.visit(bounds.min().data(), bounds.max().data(), [&](std::uint32_t i) {
+      if (!open_[i] || std::exchange(asked_[i], place_) == place_) return;
+      const LeafBox& box = cubes_[i].box;
+      ++question_;
+      const auto isReachedBy = [&](std::uint32_t f) {
+        PlacedFace& face = placed_[f];
+        return std::exchange(face.asked, question_) != question_ && reaches(face.corners, face.reach, box);
+      };
+      const Vec3 middle = middleOf(box);
+      // Those around its middle come first.
+      const bool is_reached =
+          placed_grid_.any(middle.data(), middle.data(), isReachedBy) || placed_grid_.any(box.lo, box.hi, isReachedBy);
+      if (is_reached) settle(i, body);
     });
   }
 
@@ -185,17 +219,18 @@ class ReachSearch {
   /// matter.
   void askInside(const TrackedBody& body, const Topology& topology) {
     Eigen::AlignedBox3d bounds;
-    for (const Index v : topology.usedVertices()) bounds.extend(at_[v]);
-    if (!bounds.min().allFinite() || !bounds.max().allFinite()) return;
+    for (const Index v : topology.usedVertices()) {
+      if (!at_[v].allFinite()) return;
+      bounds.extend(at_[v]);
+    }
     grid_.visit(bounds.min().data(), bounds.max().data(), [&](std::uint32_t i) {
-      if (cubes_[i].body >= 0) return;
+      if (!open_[i]) return;
       const Vec3 middle = middleOf(cubes_[i].box);
-      if (bounds.contains(middle) && isInside(at_, topology.faces(), middle)) settle(cubes_[i], body);
+      if (bounds.contains(middle) && isInside(at_, topology.faces(), middle)) settle(i, body);
     });
   }
 
-  /// The same of a rigid body, the other way round: each cube asks for the faces near it, in the body's frame. There
-  /// are many more faces than cubes. False: not here.
+  /// The same of a rigid body, in its frame, where its faces are listed once. False: not here.
   bool askRigid(const TrackedBody& body, const MeshFrame& frame, RigidShape& shape,
                 const Eigen::Isometry3d& map_from_body, const Eigen::Isometry3d& moved) {
     const Eigen::Isometry3d body_from_map = map_from_body.inverse();
@@ -211,13 +246,11 @@ class ReachSearch {
     const double sure_m = FaceReach::nearOf(body.reach_m, 2 * lo.cwiseAbs().cwiseMax(hi.cwiseAbs()).maxCoeff());
     if (!(sure_m > 0)) return false;
     const double within_m = std::max(0.0, sure_m - slack_m);  // of a cube's middle
-    ++place_;
     grid_.visit(lo.data(), hi.data(), [&](std::uint32_t i) {
-      ReachedCube& cube = cubes_[i];
-      if (cube.body >= 0 || std::exchange(asked_[i], place_) == place_) return;
+      const ReachedCube& cube = cubes_[i];
+      if (!open_[i] || std::exchange(asked_[i], place_) == place_) return;
       const Vec3 middle = middleOf(cube.box), point = body_from_map * middle;
-      const double half_m = 0.5 * (Eigen::Map<const Vec3>(cube.box.hi) - Eigen::Map<const Vec3>(cube.box.lo)).norm();
-      const double near_m = half_m + body.reach_m + slack_m;
+      const double near_m = halfOf(cube.box) + body.reach_m + slack_m;
       if (shape.bounds().squaredExteriorDistance(point) > near_m * near_m) return;
       const bool is_reached = shape.anyNear(point, near_m, [&](std::uint32_t number) {
         const double away2 = (closestOn(shape.face(number), point) - point).squaredNorm();
@@ -230,13 +263,17 @@ class ReachSearch {
         return reach.find(t, body.reach_m) && reaches(t, reach, cube.box);
       });
       // A cube that no face reaches has its middle half a voxel from all of them at the least.
-      if (is_reached || (topology.isClosed() && !body.shell && shape.holds(point))) settle(cube, body);
+      if (is_reached || (topology.isClosed() && !body.shell && shape.holds(point))) settle(i, body);
     });
     return true;
   }
 
   static Vec3 middleOf(const LeafBox& box) {
     return 0.5 * (Eigen::Map<const Vec3>(box.lo) + Eigen::Map<const Vec3>(box.hi));
+  }
+  /// How far its corners are from its middle.
+  static double halfOf(const LeafBox& box) {
+    return 0.5 * (Eigen::Map<const Vec3>(box.hi) - Eigen::Map<const Vec3>(box.lo)).norm();
   }
 
   /// From one to the other and back: each pair of points that comes up is one of the triangle and one of the cube.
@@ -246,7 +283,9 @@ class ReachSearch {
     }
     constexpr int MOST_TURNS = 24;
     const Eigen::Map<const Vec3> lo(box.lo), hi(box.hi);
-    Vec3 q = 0.5 * (lo + hi);
+    Vec3 q = middleOf(box);
+    const double most_m = reach.near_m + halfOf(box);  // from its middle, of what is within reach
+    if ((closestOn(t, q) - q).squaredNorm() > (1 + ROUNDING) * most_m * most_m) return false;
     double before = 1e300;
     for (int turn = 0; turn < MOST_TURNS; ++turn) {
       const Vec3 p = closestOn(t, q);
@@ -264,8 +303,8 @@ class ReachSearch {
 
 void searchReach(const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways,
                  const Eigen::Isometry3d& map_from_fixed, double resolution_m, std::vector<ReachedCube>& cubes,
-                 RigidShapes* shapes) {
-  ReachSearch search(cubes, resolution_m, shapes);
+                 RigidShapes* shapes, bool whole_way) {
+  ReachSearch search(cubes, resolution_m, shapes, whole_way);
   for (std::size_t b = 0; b < bodies.size(); ++b) search.search(bodies[b], ways[b], map_from_fixed);
 }
 

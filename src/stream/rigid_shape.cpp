@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "step/start/inside.h"
+
 namespace dccd {
 namespace {
 
@@ -15,13 +17,13 @@ constexpr std::size_t MOST_REMEMBERED_CELLS = std::size_t{1} << 18;
 }  // namespace
 
 bool isInside(const Positions& positions, const std::vector<Face>& faces, const Vec3& point) {
-  double angle = 0;
+  bool is_inside = false;
   for (const Face& f : faces) {
-    const Vec3 a = positions[f[0]] - point, b = positions[f[1]] - point, c = positions[f[2]] - point;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    angle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+    const Sight sight = sightOf(point.data(), positions[f[0]].data(), positions[f[1]].data(), positions[f[2]].data());
+    if (sight == Sight::TOUCHED) return true;
+    is_inside ^= sight == Sight::ABOVE;
   }
-  return std::abs(angle) >= 2 * M_PI;
+  return is_inside;
 }
 
 bool RigidShape::isOf(const MeshFrame& frame, double resolution_m) {

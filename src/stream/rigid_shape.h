@@ -15,8 +15,8 @@
 
 namespace dccd {
 
-/// Whether the point is inside of a closed surface: solid angles (Van Oosterom and Strackee 1983) add up to 0 outside
-/// and to a multiple of 4 pi inside. False where a vertex is not finite, and anything at the surface itself.
+/// Whether the point is inside of a closed surface, as the start state has it: a half-line crosses an odd number of
+/// faces, exactly, whichever way they are turned. Vertices are finite.
 bool isInside(const Positions& positions, const std::vector<Face>& faces, const Vec3& point);
 
 /// Not thread-safe.
@@ -33,11 +33,13 @@ class RigidShape {
   template <class Test>
   bool anyNear(const Vec3& point, double near_m, Test&& test) {
     ++question_;
-    const Vec3 lo = point.array() - near_m, hi = point.array() + near_m;
-    return faces_.any(lo.data(), hi.data(), [&](std::uint32_t f) {
+    const auto isNear = [&](std::uint32_t f) {
       if (std::exchange(asked_[f], question_) == question_) return false;
       return boxes_[f].squaredExteriorDistance(point) <= near_m * near_m && test(f);
-    });
+    };
+    const Vec3 lo = point.array() - near_m, hi = point.array() + near_m;
+    // The faces around the point itself come first: most points that are near are so by one of them.
+    return faces_.any(point.data(), point.data(), isNear) || faces_.any(lo.data(), hi.data(), isNear);
   }
   std::array<Vec3, 3> face(std::uint32_t number) const {
     const Face& f = topology_->faces()[number];

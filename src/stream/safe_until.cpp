@@ -14,14 +14,10 @@
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "step/parts.h"
+#include "stream/pairs_ahead.h"
 
 namespace dccd {
 namespace {
-
-constexpr double NONE = SpeedBound::NONE;
-
-double roundedDown(double value) { return std::nextafter(value, 0.0); }  // of what is 0 or more
-double roundedUp(double value) { return std::nextafter(value, NONE); }
 
 /// |to - from| > max_m_s * time, by rational arithmetic, to which doubles convert exactly.
 bool isFasterExactly(const Vec3& from, const Vec3& to, double max_m_s, StampNs time_ns) {
@@ -52,192 +48,6 @@ std::optional<std::size_t> faster(const Positions& from, const Positions& to, do
   return std::nullopt;
 }
 
-/// The fastest of the body's vertices from any of its waypoints to the next [m/s].
-double fastestOf(const Body& body, double seconds) {
-  double fastest = 0;
-  forEachLeg(body, [&](const Positions& from, const Positions& to, double share) {
-    double way_sq = 0;
-    for (std::size_t v = 0; v < from.size(); ++v) {
-      const double one_sq = (to[v] - from[v]).squaredNorm();
-      if (std::isfinite(one_sq)) way_sq = std::max(way_sq, one_sq);
-    }
-    fastest = std::max(fastest, std::sqrt(way_sq) / (share * seconds));
-  });
-  return seconds > 0 ? fastest : NONE;
-}
-
-std::string nameOf(const Outcome& outcome, std::size_t body) {
-  return body == OBSTACLE_BODY ? "octomap" : "'" + outcome.step->bodies[body].name + "'";
-}
-
-bool isItself(const Clearance& pair) { return pair.body[0] == pair.body[1]; }
-
-std::string pairOf(const Outcome& outcome, const Clearance& pair) {
-  return nameOf(outcome, pair.body[0]) + " and " + (isItself(pair) ? "itself" : nameOf(outcome, pair.body[1]));
-}
-
-/// By body of the step.
-std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given) {
-  std::vector<SpeedBound> bounds = given;
-  bounds.resize(outcome.step ? outcome.step->bodies.size() : 0);
-  for (std::size_t b = 0; b < bounds.size(); ++b) {
-    const auto require = [&](double value, const char* name) {
-      if (value >= 0) return;
-      std::ostringstream text;
-      text << "the speed bound of body '" << outcome.step->bodies[b].name << "' has " << name << " " << value
-           << "; it must be 0 or more";
-      throw std::invalid_argument(text.str());
-    };
-    require(bounds[b].max_m_s, "max_m_s");
-    require(bounds[b].last_step_factor, "last_step_factor");
-  }
-  return bounds;
-}
-
-/// The same until the next frame: with what the last step says put in.
-std::vector<SpeedBound> boundsAfter(const Outcome& outcome, const std::vector<SpeedBound>& given) {
-  std::vector<SpeedBound> bounds = boundsOf(outcome, given);
-  for (std::size_t b = 0; b < bounds.size(); ++b) {
-    SpeedBound& bound = bounds[b];
-    if (!(bound.last_step_factor > 0)) continue;
-    bound.max_m_s =
-        std::min(bound.max_m_s, bound.last_step_factor * fastestOf(outcome.step->bodies[b], outcome.duration_s()));
-  }
-  return bounds;
-}
-
-/// Why the outcome allows no promise whatever its distances are; empty: it does.
-std::string whyNone(const Outcome& outcome) {
-  if (!outcome.answered) return std::string("no answer, ") + toString(outcome.status);
-  // What a budget cut off are pairs, whose distances are bounded nonetheless; nothing else may be open.
-  const bool only_cut = outcome.status == StepStatus::DEADLINE && outcome.unproved.size() == 1;
-  if (!outcome.unproved.empty() && !only_cut) return "not proved: " + outcome.unproved.front();
-  return outcome.clearances.empty() ? "no distances were computed" : "";
-}
-
-/// A pair that says something: not one that is expected to touch, nor one with a map that is not there and that nobody
-/// misses.
-bool counts(const Outcome& outcome, const Clearance& pair) {
-  const bool mapless = pair.body[1] == OBSTACLE_BODY && !outcome.obstacle && outcome.status != StepStatus::NO_MAP;
-  return !pair.expected && !mapless;
-}
-
-/// Of which two bodies one may be inside of the other at a step's end, where that is not expected: how far their
-/// surfaces are says nothing of them. Surfaces that do not meet in all of the step carry nothing into each other, so
-/// that what is inside at its end was so when it began.
-class Insides {
- public:
-  explicit Insides(const Outcome& outcome) : outcome_(outcome) {
-    for (const StartIntersection& start : outcome.intersections) {
-      if (!start.expected && start.body[1] != OBSTACLE_BODY) known_.push_back(start.body);
-    }
-    std::sort(known_.begin(), known_.end());
-    known_.erase(std::unique(known_.begin(), known_.end()), known_.end());
-    if (outcome.start_state_complete) return;
-    for (const Body& body : outcome.step->bodies) {
-      Eigen::AlignedBox3d& box = boxes_.emplace_back();
-      for (const Vec3& position : *body.t0) box.extend(position);
-    }
-  }
-
-  /// Why the two may be; empty: they are not. The map is solid: it has distances inside, too.
-  std::string why(const Clearance& pair) const {
-    const auto [a, b] = pair.body;
-    if (a == b || b == OBSTACLE_BODY) return "";
-    if (isKnown(a, b) || isKnown(b, a)) {
-      const std::uint16_t inner = isKnown(a, b) ? a : b, outer = inner == a ? b : a;
-      return nameOf(outcome_, inner) + " is inside of " + nameOf(outcome_, outer) + ", or crosses it";
-    }
-    if (!(pair.over_step.lower_m > 0)) return pairOf(outcome_, pair) + " may have met in this step";
-    if (boxes_.empty() || !boxes_[a].intersects(boxes_[b])) return "";
-    return "it is not known whether one of " + pairOf(outcome_, pair) + " is inside of the other";
-  }
-  bool hold(const Clearance& pair) const { return !why(pair).empty(); }
-
- private:
-  bool isKnown(std::uint16_t inner, std::uint16_t outer) const {
-    return std::binary_search(known_.begin(), known_.end(), std::array<std::uint16_t, 2>{inner, outer});
-  }
-  const Outcome& outcome_;
-  std::vector<std::array<std::uint16_t, 2>> known_;  // ascending
-  std::vector<Eigen::AlignedBox3d> boxes_;           // when the step began; empty: all that was inside then is known
-};
-
-/// What is certainly between the two at the step's end until they touch [m]; 0: nothing, or nobody knows.
-double distanceOf(const Outcome& outcome, const Insides& insides, const Clearance& pair) {
-  const ClearanceStatus status = pair.at_end.status;
-  if (status == ClearanceStatus::TOUCHING || status == ClearanceStatus::UNKNOWN) return 0;
-  if (insides.hold(pair)) return 0;
-  const std::vector<Body>& bodies = outcome.step->bodies;
-  const double separation_m = pair.body[1] == OBSTACLE_BODY ? separationFromMap(bodies[pair.body[0]])
-                                                            : separationBetween(bodies[pair.body[0]], pair.body[0],
-                                                                                bodies[pair.body[1]], pair.body[1]);
-  const double rest_m = pair.at_end.lower_m - separation_m;
-  if (!(rest_m > 0) || !std::isfinite(rest_m)) return 0;
-  return separation_m > 0 ? roundedDown(rest_m) : rest_m;
-}
-
-/// Of both partners [m/s]; the map stands still.
-struct Speeds {
-  double slowed = 0, other = 0;  // slowed 0: nothing of the two slows down
-  std::string unbounded;         // a body of which nobody says how fast it is
-};
-Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
-  Speeds speeds;
-  for (const std::uint16_t body : pair.body) {
-    if (body == OBSTACLE_BODY) continue;
-    double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
-    if (!std::isfinite(bounds[body].max_m_s)) speeds.unbounded = outcome.step->bodies[body].name;
-    sum = sum == 0 ? bounds[body].max_m_s : roundedUp(sum + bounds[body].max_m_s);
-  }
-  return speeds;
-}
-
-std::string unboundedReason(const std::string& body) { return "no speed bound is known of body '" + body + "'"; }
-
-std::string zeroReason(const Outcome& outcome, const Insides& insides, const Clearance& pair) {
-  const bool unknown = pair.at_end.status == ClearanceStatus::UNKNOWN;
-  if (pair.at_end.lower_m > 0 && !unknown && insides.hold(pair)) return insides.why(pair);
-  return "the distance of " + pairOf(outcome, pair) + (unknown ? " is not known" : " may be 0");
-}
-
-/// Calls f(row, its number) for each pair of partners. Those without a row are as far apart as the one that stands for
-/// them says (distance()); their number is NO_PAIR.
-template <class F>
-void forPairs(const Outcome& outcome, F&& f) {
-  const std::vector<Clearance>& rows = outcome.clearances;
-  for (std::size_t p = 0; p < rows.size(); ++p) f(rows[p], p);
-  if (rows.size() >= outcome.stats[Effect::CLEARANCE].in) return;
-  const auto stands = std::find_if(rows.begin(), rows.end(), [](const Clearance& row) {
-    return row.over_step.status == ClearanceStatus::FARTHER && !isItself(row) && !row.expected;
-  });
-  Clearance without = stands == rows.end() ? Clearance() : *stands;
-  const std::vector<Body>& bodies = outcome.step->bodies;
-  auto row = rows.begin();
-  for (std::size_t a = 0; a < bodies.size(); ++a) {
-    for (std::size_t b = a; b <= bodies.size(); ++b) {
-      without.body = {static_cast<std::uint16_t>(a),
-                      b == bodies.size() ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
-      if (row != rows.end() && row->body == without.body) {
-        ++row;
-      } else if (b == bodies.size() ? meetsMap(bodies[a]) && outcome.obstacle
-                                    : b > a && meet(bodies[a], a, bodies[b], b)) {
-        f(without, SafeUntil::NO_PAIR);
-      }
-    }
-  }
-}
-
-/// Rounded down: seconds in which a distance above 0 is closed.
-double secondsTo(double distance_m, double closing_m_s) {
-  return closing_m_s == 0 ? MOST_PROMISED_S : std::min(MOST_PROMISED_S, roundedDown(distance_m / closing_m_s));
-}
-
-StampNs nsIn(double seconds) {
-  if (seconds == MOST_PROMISED_S) return static_cast<StampNs>(MOST_PROMISED_S * 1e9);
-  return static_cast<StampNs>(std::floor(roundedDown(seconds * 1e9)));
-}
-
 /// Whether something is occupied that was not before.
 bool hasNewVoxels(const VoxelSurface& now, const VoxelSurface& before) {
   bool found = now.resolution() != before.resolution();
@@ -263,8 +73,7 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
     if (!counts(outcome, pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
     const double distance_m = distanceOf(outcome, insides, pair);
-    double closing_m_s = speeds.slowed + speeds.other;
-    if (speeds.slowed > 0 && speeds.other > 0) closing_m_s = roundedUp(closing_m_s);
+    const double closing_m_s = speeds.closing();
     const bool nothing = distance_m == 0 || !std::isfinite(closing_m_s);
     const double seconds = nothing ? 0 : secondsTo(distance_m, closing_m_s);
     if (!isItself(pair)) {
@@ -288,6 +97,7 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
 
 const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
   broken_.clear();
+  const StampNs promise_ends_ns = promise_.others_until_ns;
   promise_ = safeUntil(outcome, bounds_);
   if (!outcome.answered) return promise_;
   broken_ = std::exchange(revoked_, {});
@@ -326,17 +136,30 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
                        step_->map.map_from_fixed.matrix() != outcome.step->map.map_from_fixed.matrix();
     const bool grew = outcome.obstacle && outcome.obstacle != obstacle_ &&
                       (obstacle_ ? hasNewVoxels(*outcome.obstacle, *obstacle_) : outcome.obstacle->leafCount() > 0);
+    const std::string why = why_void_ && outcome.stamp_ns <= promise_ends_ns ? why_void_(outcome) : "";
+    if (!why.empty()) say(why);
     if (moved) say("the map is elsewhere");
     if (grew) say("the map has new voxels");
     ++(broken_.empty() ? counts_.kept : counts_.broken);
   }
   step_ = nullptr;
-  if (!promise_.isPromise()) return promise_;
+  why_void_ = nullptr;
+  if (promise_.isPromise()) keep(outcome);
+  return promise_;
+}
+
+void PromiseWatch::keep(const Outcome& outcome) {
   ++counts_.made;
   step_ = outcome.step;
   obstacle_ = outcome.obstacle;
   assumed_ = boundsAfter(outcome, bounds_);
-  return promise_;
+}
+
+void PromiseWatch::extend(const Outcome& outcome, const SafeUntil& later,
+                          std::function<std::string(const Outcome&)> why_void) {
+  promise_ = later;
+  why_void_ = std::move(why_void);
+  if (!step_ && promise_.isPromise()) keep(outcome);
 }
 
 void PromiseWatch::revoke(const std::string& why) {
@@ -350,6 +173,7 @@ void PromiseWatch::revoke(const std::string& why) {
 void PromiseWatch::forget(const std::string& why) {
   step_ = nullptr;
   obstacle_ = nullptr;
+  why_void_ = nullptr;
   const StampNs stamp_ns = promise_.stamp_ns;
   promise_ = {};
   promise_.stamp_ns = promise_.until_ns = promise_.others_until_ns = stamp_ns;

@@ -5,7 +5,7 @@ import sys
 import time
 
 import rospy
-from geometry_msgs.msg import Point, TransformStamped
+from geometry_msgs.msg import Point
 from deformable_ccd.msg import MeshStamped
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2
@@ -111,19 +111,6 @@ def be_silent(topic, kind):
     return publisher
 
 
-def publish_transforms(frame, begin_s, rate=20.0):
-    """Of a frame that stands still; its clock began with TODAY when the steady one had this time."""
-    rospy.init_node('transforms', anonymous=True)
-    publisher = rospy.Publisher('/tf', TFMessage, queue_size=10)
-    while not rospy.is_shutdown():
-        one = TransformStamped(child_frame_id=frame)
-        one.header.frame_id = 'world'
-        one.header.stamp = rospy.Time.from_sec(TODAY + time.monotonic() - begin_s)
-        one.transform.rotation.w = 1
-        publisher.publish(TFMessage([one]))
-        time.sleep(1 / rate)
-
-
 def publish_shifted(frame, by_m):
     """Each transform of a frame that another one sends, once more, higher."""
     rospy.init_node('shifted', anonymous=True)
@@ -144,11 +131,11 @@ KINDS = {'cloud': (PointCloud2, flat_cloud), 'mesh': (MeshStamped, sheet_mesh)}
 
 
 def main(arguments):
-    """PROGRAM publish|silent KIND TOPIC, transforms FRAME BEGIN_S, shifted FRAME BY_M"""
+    """PROGRAM publish|silent KIND TOPIC, shifted FRAME BY_M"""
     from std_msgs.msg import String
     what, kind, topic = arguments
-    if what in ('transforms', 'shifted'):
-        return (publish_transforms if what == 'transforms' else publish_shifted)(kind, float(topic))
+    if what == 'shifted':
+        return publish_shifted(kind, float(topic))
     message, make = KINDS.get(kind, (String, None))
     if what == 'publish':
         publish_stream(topic, make, message)

@@ -107,14 +107,14 @@ class StateTest(LiveNodeTest):
 
     def test_steps_that_take_longer_than_frames_come(self):
         self.start_node('slow', step_budget_ms=1e6, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
-        cloud = Cloud(220, 220)
+        cloud = Cloud(280, 280)
         # Of two frames at once, the node's queue of one may drop the first before it is taken: then there is no step.
         self.publisher.publish(cloud.message())
         wait_for(lambda: self.contacts, 20, 'the first frame to be taken')
         self.publisher.publish(cloud.message())
         wait_for(lambda: any(c.answered for c in self.contacts), 120, 'a step')
         step_s = max(s.total_ms for s in self.stats) * 1e-3
-        self.assertGreater(step_s, 0.2, 'the cloth is too small for this machine')
+        self.assertGreater(step_s, 0.15, 'the cloth is too small for this machine')
         said = len(self.states)
         self.publisher.publish(cloud.message())
         wait_for(lambda: len(self.states) > said, step_s + 10, 'a word before the answer')
@@ -163,21 +163,6 @@ class StateTest(LiveNodeTest):
         wait_for(lambda: 'since the reset' in self.states[-1].reason, 60, 'the reset')
         self.assertFalse(any(s.proved for s in self.states[said:]), 'the step that still ended proves nothing')
         self.assertTrue(self.states[-1].holds_until.is_zero())
-
-    def test_disabled(self):
-        self.start_node('disabled')
-        stream = self.stream(Sheet())
-        self.wait_proved()
-        enable = rospy.ServiceProxy('/disabled/enable', SetBool)
-        enable(False)
-        said = len(self.states)
-        self.wait_missing('disabled')
-        time.sleep(0.3)
-        self.assertFalse(any(s.proved for s in self.states[said:]))
-        enable(True)
-        self.wait_proved()
-        stream.end()
-        self.assert_consistent()
 
     def test_a_newer_frame_of_a_static_body(self):
         """It voids what was said as soon as it comes, not with the next step."""

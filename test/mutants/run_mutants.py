@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Makes each error of mutants.txt, one at a time, in a copy of the checkout, and demands that the named tests fail.
 
-usage: test/mutants/run_mutants.py [--in COPY] [NAME...]
+usage: test/mutants/run_mutants.py [--in COPY] [--witnesses | NAME...]
   NAME      only these mutants
+  --witnesses  instead: each witness of a proof left out, one at a time, which must cost a test its proof. They are found
+            in the code: what answers a question of a Claim, and what says that something was looked at
   --in      a copy of the checkout that is built with its tests already; its files are changed, and changed back.
             Else build/mutants, which is copied and built first
 Exit status: 1 where a mutant survives, or its tests fail without it, too.
@@ -43,6 +45,29 @@ def read_mutants(text):
 
 
 ALL = read_mutants((HERE / 'mutants.txt').read_text())
+
+
+# A statement of its own, with the condition on its line, that answers a question or says what was looked at.
+WITNESS = re.compile(r'^ *(?:if \([^;]*?\) )?(?:(?:outcome\.)?claim\.answer\(|answer\(Question::|looked\.(?:at|compared)\w*\()'
+                     r'(?s:.*?);\n', re.M)
+# By folder: what is built, and what takes all the answers of that folder.
+PROVED = {'src/step': ('unit_tests', 'Spared.*:Assurance.HoldsWhereNothingIsMissing'), 'src/node': ('ros_tests', 'CellsClaim.*')}
+
+
+def witnesses():
+    """A mutant for each."""
+    found = []
+    for folder, (target, tests) in PROVED.items():
+        for path in sorted((CHECKOUT / folder).rglob('*.cpp')):
+            text = path.read_text()
+            for number, match in enumerate(WITNESS.finditer(text)):
+                start = match.start()
+                while text.count(text[start:match.end()]) > 1:  # with the lines before it, there just once
+                    start = text.rindex('\n', 0, start - 1) + 1
+                name = '%s-%d' % (path.stem, number + 1)
+                found.append(Mutant(name, str(path.relative_to(CHECKOUT)), text[start:match.end()],
+                                    text[start:match.start()], [target], tests))
+    return found
 
 
 class Copy:
@@ -116,11 +141,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('names', nargs='*', metavar='NAME')
     parser.add_argument('--in', dest='copy', type=pathlib.Path)
+    parser.add_argument('--witnesses', action='store_true')
     arguments = parser.parse_args()
-    unknown = set(arguments.names) - {mutant.name for mutant in ALL}
+    known = witnesses() if arguments.witnesses else ALL
+    unknown = set(arguments.names) - {mutant.name for mutant in known}
     if unknown:
         parser.error('no mutant is named ' + ', '.join(sorted(unknown)))
-    chosen = [mutant for mutant in ALL if not arguments.names or mutant.name in arguments.names]
+    chosen = [mutant for mutant in known if not arguments.names or mutant.name in arguments.names]
     copy = Copy(arguments.copy or CHECKOUT / 'build' / 'mutants')
     if not arguments.copy:
         copy.make()

@@ -10,6 +10,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from analyze_bag_support import AnalyzeBagTestCase
 from bag_messages import transform
+from checkout import TOOLS, run
 
 
 def moving(cloth, stamp, at, transform_at):
@@ -113,6 +114,40 @@ class AnalyzeBagFramesTest(AnalyzeBagTestCase):
                           '  upper: {topic: /parts, marker: {namespace: upper}}\n')
         report = self.analyze('shared', self.write('shared.bag', messages), '--params', params)
         self.assertEqual(self.statuses_of(report), {'FIRST_FRAME': 1, 'OK': 4})
+
+    def test_a_rope_that_repeats_a_point(self):
+        """Once or twice: it does not touch itself there, and all of it is looked at. The judge that shares nothing says so, too."""
+        for repeats in (1, 2):
+            messages, places = [], [0, 1, 2] + [2] * repeats + [3]
+            for frame in range(5):
+                marker = Marker(type=Marker.LINE_STRIP, points=[Point(x, 0.01 * frame * x, 0) for x in places])
+                marker.header.stamp, marker.header.frame_id = genpy.Time(100 + 0.1 * frame), 'world'
+                marker.pose.orientation.w = marker.scale.x = 1
+                messages.append(('/rope', marker, marker.header.stamp))
+            bag = self.write('rope_%d.bag' % repeats, messages)
+            self.assertEqual(self.analyzed('rope', bag)[0], 0, self.said)
+            self.assertIn('No contact in 4 answered steps; all of it proved', self.said)
+            judged = run(TOOLS / 'audit_bag', bag)
+            self.assertEqual(judged.returncode, 0, judged.stdout)
+
+    def test_ropes_of_one_message(self):
+        """Three of them, numbered backwards; the last goes over the first. The judge that shares nothing says the same as the monitor."""
+        messages = []
+        for frame in range(5):
+            at, array = genpy.Time(100 + 0.1 * frame), MarkerArray()
+            for number, (x, height) in enumerate(((2, 0), (1, 0.5), (0, 0.25 - 0.1 * frame))):
+                marker = Marker(ns='rope', id=2 - number, type=Marker.LINE_STRIP)
+                marker.points = [Point(x + 1.2 * k * (number == 2), k * (number < 2) - 0.4, height) for k in range(3 + number)]
+                marker.header.stamp, marker.header.frame_id = at, 'world'
+                marker.pose.orientation.w = marker.scale.x = 1
+                array.markers.append(marker)
+            messages.append(('/ropes', array, at))
+        bag = self.write('ropes.bag', messages)
+        self.assertEqual(self.analyzed('ropes', bag)[0], 0, self.said)
+        self.assertRegex(self.said, 'contacts in 1 of 4 answered steps; all of it proved')
+        judged = run(TOOLS / 'audit_bag', bag)
+        self.assertEqual(judged.returncode, 0, judged.stdout)
+        self.assertIn('4 claims hold', judged.stdout)
 
     def ended(self, name, others, bodies):
         """Exit status and last line of a cloth that rests for a second, and of what else moves in the world."""

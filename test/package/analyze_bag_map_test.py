@@ -88,6 +88,12 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         self.assertEqual((status, set(statuses)), (0, {'FIRST_FRAME', 'OK'}), complaints)
         with open(self.folder / 'pictured/contacts.csv') as file:
             self.assertIn('octomap', {row['body_1'] for row in csv.DictReader(file)})
+        own = copy.deepcopy(info)
+        own.header.stamp, own.P[0] = plate.header.stamp, 2 * info.P[0]
+        pictures.insert(-1, ('/depth/camera_info', own, pictures[-2][2]))  # it comes after its picture
+        status, _, complaints, statuses = self.analyzed('zoomed', self.write('zoomed.bag', pictures), *seen)
+        self.assertEqual((status, statuses['NO_MAP']), (3, 1), complaints)
+        self.assertIn('came after that was used, and differs from those before', complaints)
         words = self.params(given)
         status, _, complaints, statuses = self.analyzed('cloudless', self.bag, *words)
         self.assertEqual((status, set(statuses)), (3, {'FIRST_FRAME', 'NO_MAP'}))

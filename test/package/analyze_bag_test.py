@@ -40,7 +40,8 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
 
     def test_what_is_missing_or_misspelt_is_named_as_the_user_knows_it(self):
         alone = self.write('map_alone.bag', [('/octomap_binary', self.octomap(), self.messages[0][2])])
-        self.assertIn('no topic of a mesh type; the bag has /octomap_binary (octomap_msgs/Octomap)', self.refused(alone))
+        self.assertRegex(self.refused(alone), r'no topic of a mesh type; the bag has /octomap_binary \(octomap_msgs/Octomap\).*'
+                                              'doc/messages.md, "Messages of another type"')
         self.assertIn('no topic /clth; the bag has /cloth (', self.refused(self.bag, '--mesh', '/clth'))
         bodies = self.params('bodies: {cloth: {topic: /cloth}}\n')
         self.assertRegex(self.refused(self.bag, *bodies, '--mesh', '/clth'), '--mesh has no place beside the bodies of .*given.yaml')
@@ -55,6 +56,18 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
         self.analyzed('large', self.write('large.bag', cloths))
         headline = json.loads((self.folder / 'large/report.json').read_text())['headline']
         self.assertRegex(headline, r'TELEPORT: .* m across: are its coordinates in millimetres\?')
+
+    def test_a_doubt_stands_beside_the_proof(self):
+        cloths = copy.deepcopy(self.cloths[:3])
+        for _, message, _ in cloths:
+            for v, first in zip(message.vertices, self.cloths[0][1].vertices):
+                v.x, v.y, v.z = 1000 * first.x, 1000 * first.y, 1000 * first.z
+        status, said, errors, _ = self.analyzed('at_rest', self.write('at_rest.bag', cloths))
+        self.assertEqual(status, 0, errors)
+        doubt = r"in doubt: body 'mesh': the mesh is [\d.]+ m across; coordinates are in metres, are these millimetres\?"
+        self.assertRegex(said.splitlines()[0], 'all of it proved; ' + doubt)
+        self.assertRegex(said.splitlines()[-1], '^' + doubt)
+        self.assertEqual(len(json.loads((self.folder / 'at_rest/report.json').read_text())['proof']['doubts']), 1)
 
     def test_a_step_that_is_not_proved_says_why_in_its_row(self):
         mask = 'vertex_mask: [%s]' % ', '.join(map(str, range(len(self.cloths[0][1].vertices))))

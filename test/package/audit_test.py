@@ -57,7 +57,8 @@ class AuditTest(AnalyzeBagTestCase):
         status, verdict, said = self.audit(self.out)
         self.assertEqual((status, verdict['refuted'], verdict['not_covered']), (0, [], []), said)
         self.assertGreater(verdict['held'], 35)
-        self.assertEqual(self.audit(self.bag)[0], 0, 'it asks analyze_bag where nothing was said')
+        status, verdict, said = self.audit(self.bag)  # it asks analyze_bag where nothing was said
+        self.assertEqual(status, 0, said)
 
     def test_a_contact_that_is_hidden(self):
         hidden = []
@@ -128,7 +129,7 @@ class AuditTest(AnalyzeBagTestCase):
                 names = [a.name for a in node.names] if isinstance(node, ast.Import) else \
                     [node.module] if isinstance(node, ast.ImportFrom) else []
                 self.assertLessEqual(set(names), allowed, path)
-        self.assertLessEqual(sum(p.read_text().count('\n') for p in FILES), 2585)
+        self.assertLessEqual(sum(p.read_text().count('\n') for p in FILES), 2586)
 
 
 FINGER = 'v -.02 -.02 -.02\nv .02 -.02 -.02\nv 0 .02 -.02\nv 0 0 .02\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
@@ -294,7 +295,7 @@ class CellTest(FolderTestCase):
 
     def test_own_voxels(self):
         words = 'octomap_topic: /octomap_binary\nown_voxels_m: 0.02\n'
-        second = lambda when: lambda at: [self.voxels([(9, 9, 9)], at(0)), self.voxels([(9, 9, 9), (0, 0, 1)], at(when))]
+        second = lambda when: lambda at: [*(self.voxels([(9, 9, 9)], at(k)) for k in range(when)), self.voxels([(9, 9, 9), (0, 0, 1)], at(when))]
         self.cell('obstacle', words, lowest=0.08, obstacle='true', more=second(2))
         self.holds()
         self.refuted('state', self.nothing_touches, 'clear', 'of cloth and .* of octomap meet')

@@ -85,6 +85,20 @@ class DependenciesTest(unittest.TestCase):
                     self.assertIn('checked 1 packages and found 0 problems', result.stderr)
 
 
+class CalledTest(unittest.TestCase):
+    """What sentences and pages have people call is installed by scripts/setup. `rosrun tf tf_echo` was not."""
+    HAS = {'tf2_tools': 'tf2-tools', 'nodelet': 'libnodeletlib-tools', 'dynamic_reconfigure': 'python3-dynamic-reconfigure',
+           'deformable_ccd': None}
+
+    def test_every_rosrun(self):
+        texts = [*(CHECKOUT / 'src').rglob('*.cpp'), *(CHECKOUT / 'doc').glob('*.md'), *CHECKOUT.glob('*.md')]
+        called = {(found, path.name) for path in texts for found in re.findall(r'rosrun (\w+) ', path.read_text())}
+        self.assertIn(('tf2_tools', 'advice.cpp'), called)
+        self.assertEqual([one for one in sorted(called) if one[0] not in self.HAS], [])
+        installed = debian_list()['build']
+        self.assertEqual([package for package in self.HAS.values() if package and package not in installed], [])
+
+
 class LibraryTest(unittest.TestCase):
     def test_it_shows_its_interface_and_nothing_within(self):
         library = TOOLS.parent / 'libdeformable_ccd.so'

@@ -10,12 +10,11 @@ GTEST = re.compile(r'\b(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)')
 
 
 def rows():
-    """Of each row: the promise, the attack, the names in its last two columns (the proof's are files), and the last column."""
+    """Of each row: the promise, the attack, the names in its last column, and that column."""
     for line in PAGE.read_text().splitlines():
         cells = [cell.strip() for cell in line.strip('|').split('|')] if line.startswith('|') else []
-        if len(cells) == 5 and not set(cells[0]) <= set('-: ') and cells[0] != 'promise':
-            proof, test = (re.findall(r'`([^`]+)`', cell) for cell in cells[3:])
-            yield cells[0], cells[1], [name for name in proof if '/' in name] + test, cells[4]
+        if len(cells) == 4 and not set(cells[0]) <= set('-: ') and cells[0] != 'promise':
+            yield cells[0], cells[1], re.findall(r'`([^`]+)`', cells[3]), cells[3]
 
 
 class Tests:

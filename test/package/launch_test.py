@@ -43,7 +43,7 @@ DEFAULTS = {'monitor.launch': {}, 'replay.launch': {'default_topic': '/cloth'}}
 LAUNCH_FILES = sorted((CHECKOUT / 'launch').rglob('*.launch'))
 PRESETS = [path for path in LAUNCH_FILES if path.parent.name == 'presets']
 # What a launch file has another default for than monitor.launch: of the presets, two call for a map.
-OWN_DEFAULTS = {'octomap_server.launch': {'octomap': '/octomap_binary'},
+OWN_DEFAULTS = {'octomap_server.launch': {'octomap': '/octomap_full'},
                 'realsense.launch': {'obstacle_cloud': '/camera/depth/color/points'}, 'demo.launch': {'params', 'default_mesh'},
                 'replay.launch': {'default_mesh'}}
 # A cloth among several bodies: its file has it under bodies/cloth.
@@ -133,7 +133,7 @@ class LaunchTest(unittest.TestCase):
     def test_nobody_names_a_map_but_the_presets_that_do(self):
         """A remapping names a topic, and it holds for the resolved name, too: what the file calls /mesh would be sent
         elsewhere."""
-        named = {'octomap_server.launch': ({'octomap_topic': 'octomap_binary'}, {'octomap_binary:=/octomap_binary'}),
+        named = {'octomap_server.launch': ({'octomap_topic': 'octomap_binary'}, {'octomap_binary:=/octomap_full'}),
                  'realsense.launch': ({'obstacle_cloud_topic': 'obstacle_cloud'}, {'obstacle_cloud:=/camera/depth/color/points'}),
                  'sensor.launch': ({'obstacle_cloud_topic': '/camera/depth/image_raw'}, set())}
         for path in LAUNCH_FILES:
@@ -152,6 +152,15 @@ class LaunchTest(unittest.TestCase):
                 self.assertIn('config/presets/' + own.name, preset.read_text())
                 added = self.parameters(preset, self.file('max_step_s: 7.0\n'), 'accuracy:=conservative', 'num_threads:=2')
                 self.assertEqual(added, {**plain, 'max_step_s': 7.0})
+
+    def test_the_readme_says_which_frame_a_preset_sets(self):
+        """A user with another one has NO_TRANSFORM, and has typed nothing of `map`."""
+        readme = (CHECKOUT / 'README.md').read_text()
+        frames = {preset.name: self.parameters(preset).get('fixed_frame') for preset in PRESETS}
+        self.assertEqual(frames['octomap_server.launch'], 'map')
+        for name, frame in frames.items():
+            if frame and name in readme:
+                self.assertIn('`%s` (its `fixed_frame` is `%s`;' % (name, frame), readme)
 
     def test_a_rope_of_cdcpd_has_no_rows(self):
         found = self.parameters('presets/cdcpd.launch', 'topology:=polyline')
@@ -196,6 +205,17 @@ class LaunchTest(unittest.TestCase):
         launched = self.start('roslaunch', '--wait', str(PRESETS[0]), self.file('acuracy: exact\n'))
         self.expect_said('cannot start: parameter ~acuracy')
         launched.wait(30)
+        self.assertNotIn('earlier start', self.log_of('roslaunch').read_text(), 'the file has set it')
+
+    def test_an_earlier_start_is_named_where_nothing_else_set_it(self):
+        master = self.start_master()
+        node = str(TOOLS / 'collision_monitor_node')
+        self.start(node, '__name:=collision_monitor', '_acuracy:=exact').wait(30)
+        self.expect_said('cannot start: parameter ~acuracy', node)
+        self.assertNotIn('earlier start', self.log_of(node).read_text(), 'this one has set it')
+        self.assertTrue(master.hasParam(NODE + 'acuracy'))
+        self.start(node, '__name:=collision_monitor').wait(30)
+        self.expect_said('(an earlier start may have left it: rosparam delete /collision_monitor)', node)
 
     def test_everybody_looks_for_the_map_in_the_same_place(self):
         """Node, nodelet, launch file and analyze_bag, where nobody named it."""
@@ -301,7 +321,7 @@ class ArgumentsTest(unittest.TestCase):
             with self.subTest(path.name):
                 self.assertLessEqual(differing, own)
                 self.assertEqual(given.get('octomap'),
-                                 '/octomap_binary' if path.name == 'octomap_server.launch' else '-')
+                                 '/octomap_full' if path.name == 'octomap_server.launch' else '-')
 
 
 if __name__ == '__main__':

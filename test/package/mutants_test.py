@@ -34,11 +34,24 @@ class Mutants(unittest.TestCase):
             else:
                 self.assertEqual({name.split('.')[0].split('/')[-1] for name in mutant.tests.split(':')} - suites, set(), mutant.name)
 
+    def test_each_question_of_a_claim_has_a_witness_that_can_be_left_out(self):
+        header = (CHECKOUT / 'include/dccd/outcome.h').read_text()
+        questions = set(re.findall(r'^  ROW\((\w+), (?:BODY|WHOLE), (?:STEP|CELL), ', header, re.M))
+        self.assertGreater(len(questions), 10)
+        witnesses = run_mutants.witnesses()
+        answered = {name for mutant in witnesses for name in re.findall(r'Question::(\w+)', mutant.old)}
+        self.assertEqual(questions - answered, set(), 'nobody answers these')
+        for mutant in witnesses:
+            text = (CHECKOUT / mutant.file).read_text()
+            self.assertEqual(text.count(mutant.old), 1, mutant.name)
+            self.assertLess(len(mutant.new), len(mutant.old), mutant.name)
+
     @unittest.skipUnless(os.environ.get('DEFORMABLE_CCD_LONG'), 'builds a copy of the checkout, then each mutant: --long')
     def test_each_is_killed(self):
-        done = subprocess.run([sys.executable, str(CHECKOUT / 'test/mutants/run_mutants.py')], stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, text=True)
-        self.assertEqual(done.returncode, 0, done.stdout)
+        for which in ([], ['--witnesses']):
+            done = subprocess.run([sys.executable, str(CHECKOUT / 'test/mutants/run_mutants.py'), *which],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            self.assertEqual(done.returncode, 0, done.stdout)
 
 
 if __name__ == '__main__':

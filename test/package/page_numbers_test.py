@@ -27,19 +27,8 @@ def tolerance(name):
     return constant('include/dccd/tolerances.h', name)
 
 
-def player(name):
-    return constant('src/report/player_data.h', name)
-
-
-def fleet(option):
-    return constant('fleet/analyze_fleet', option, r"'--%s', type=whole, default=(\d+)")
-
-
 # Of each page: what it says, with the number in brackets, and what the code has.
 NUMBERS = {
-    'doc/clearance.md': [
-        (r'Of more than ([\d,]+) pairs', lambda: constant('src/step/clearance/clearance_finder.h', 'MOST_ROWS')),
-    ],
     'doc/interface.md': [
         (r'(\d+) steps wait at most', lambda: constant('include/dccd/stream.h', 'max_waiting')),
         (r'box around them, ([\d,]+) at most', lambda: constant('src/output/scene_markers.cpp', 'MAX_VOXELS_SHOWN')),
@@ -53,32 +42,12 @@ NUMBERS = {
         (r'`DCCD_API_VERSION` \((\d+)\)', lambda: constant('include/dccd/export.h', 'DCCD_API_VERSION', r'define %s (\d+)')),
         (r'for `hold_s` \(([\d.]+)\)', lambda: constant('examples/stop_the_arm.py', 'hold_s', r'\b%s=([\d.]+)')),
     ],
-    'doc/mesh_files.md': [
-        (r'Files over (\d+) MiB', lambda: constant('src/input/mesh_file.cpp', 'MAX_FILE_BYTES') / MB),
-    ],
-    'doc/tools.md': [
-        (r'at most (\d+) files a run', lambda: constant('src/record/flight_recorder.h', 'MAX_SURPRISES')),
-        (r'room for (\d+) MB of frames', lambda: player('BUDGET_BYTES') / 10**6),
-        (r'at most (\d+) contacts and \d+ patches', lambda: player('MOST_CONTACTS')),
-        (r'at most \d+ contacts and (\d+) patches', lambda: player('MOST_PATCHES')),
-        (r'rounded to 1/(\d+) of', lambda: constant('src/report/player_data.cpp', 'QUANTA_OF_A_BODY')),
-        (r'elsewhere a line every (\d+) s',
-         lambda: constant('src/report/progress_bar.h', 'line_every', r'\b%s = std::chrono::seconds\((\d+)\)')),
-    ],
     'doc/guarantees.md': [
         (r'([\d,]+) names of frames', lambda: constant('src/input/transforms.h', 'MAX_FRAMES')),
         (r'([\d,]+) transforms in 10 s', lambda: constant('src/input/transforms.h', 'MAX_KEPT')),
         (r'own queue of (\d+) messages', lambda: constant('src/input/watched_queue.h', 'SUBSCRIBER_QUEUE')),
         (r'DAE at most ([\d,]+) tags', lambda: constant('src/input/dae_file.cpp', 'MOST_MARKS')),
         (r'told to stop; ([\d.]+) s after', lambda: constant('src/node/collision_monitor.cpp', 'END_AFTER') / 1000),
-    ],
-    'doc/development.md': [
-        (r'`sync_timeout_s` and (\d+) steps', lambda: constant('include/dccd/stream.h', 'max_waiting')),
-    ],
-    'doc/fleet.md': [
-        (r'job may take ([\d,]+) MB', lambda: fleet('mem-mb')),
-        (r'MB and (\d+) minutes', lambda: fleet('runtime')),
-        (r'at most (\d+) run at once', lambda: fleet('jobs')),
     ],
 }
 

@@ -61,7 +61,7 @@ class AnswersTest(PythonTestCase):
                          self_collision=body.self_collision, against_bodies=body.against_bodies,
                          against_obstacle=body.against_obstacle, shell=body.shell, vertex_mask=body.vertex_mask,
                          minimum_separation_m=body.minimum_separation_m, separations_m=body.separations_m,
-                         reference=body.reference, reference_radius_m=body.reference_radius_m, radius_m=body.radius_m,
+                         reference=body.reference, radius_m=body.radius_m,
                          pose_t0=body.pose_t0, pose_t1=body.pose_t1)
 
     def answer(self, step):
@@ -471,9 +471,7 @@ class ArraysTest(PythonTestCase):
                 ({'radius_m': [-1.] * 6}, ValueError, r'radius_m\[0\] is -1'),
                 ({'radius_m': [1.]}, ValueError, 'radius_m has 1 radii; the mesh has 6 vertices'),
                 ({'minimum_separation_m': math.nan}, ValueError, 'minimum_separation_m = nan'),
-                ({'reference': t0[:2]}, ValueError, 'needs 6 positions'),
-                ({'reference_radius_m': [0.] * 6}, TypeError, 'reference_radius_m goes with reference'),
-                ({'reference': t0, 'reference_radius_m': [0.] * 5}, ValueError, 'no or as many radii in its reference frame'),
+                ({'reference': t0[:2]}, ValueError, 'needs 6 positions in its reference frame, got 2'),
                 ({'pose_t0': np.eye(4)}, TypeError, 'pose_t0 and pose_t1 go together'),
                 ({'pose_t0': np.eye(4), 'pose_t1': turned}, ValueError, 'pose_t1 is no pose'),
                 ({'pose_t0': np.diag([1., 1, -1, 1]), 'pose_t1': np.eye(4)}, ValueError, 'pose_t0 is no pose'),
@@ -487,6 +485,7 @@ class ArraysTest(PythonTestCase):
         body = dccd.Body(self.t0, self.t1, FACES, name='cloth')
         for options, error, sentence in [
                 ({'acuracy': 'exact'}, TypeError, "there is no option 'acuracy'; there are accuracy, tolerance_m"),
+                ({'minimum_separation_m': .01}, TypeError, r"'minimum_separation_m' is no option of a call but of a body: dccd.Body\("),
                 ({'accuracy': 'best'}, ValueError, 'accuracy: "best" is none of conservative, exact'),
                 ({'accuracy': 1}, TypeError, 'accuracy is 1; expected a str'),
                 ({'toc_bits': 60}, ValueError, 'toc_bits'), ({'toc_bits': 'all'}, TypeError, "toc_bits is 'all'; expected an integer"),

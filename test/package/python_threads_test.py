@@ -99,6 +99,25 @@ class ThreadsTest(PythonTestCase):
         said, errors = process.communicate(timeout=120)
         self.assertEqual((said, errors), ('True DEADLINE False False\n', ''))
 
+    def test_many_threads_may_be_the_first(self):
+        """Types of arrays are made when the first asks, which once waited for itself: two of three such starts hung."""
+        for _ in range(5):
+            process = self.start('''
+                import sys
+                sys.setswitchinterval(1e-6)
+                together, seen = threading.Barrier(8), []
+                small = dccd.Body([[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles=[[0, 1, 2]])
+                def ask():
+                    together.wait()
+                    outcome = dccd.detect(small)
+                    seen.append((len(outcome.contacts), len(outcome.intersections), len(outcome.clearances)))
+                threads = [threading.Thread(target=ask) for _ in range(8)]
+                for thread in threads: thread.start()
+                for thread in threads: thread.join()
+                print(set(seen), len(seen))''')
+            said, errors = process.communicate(timeout=60)
+            self.assertEqual((said, errors), ('{(0, 0, 0)} 8\n', ''))
+
     def test_threads_may_share_a_history_and_a_stream(self):
         t0, t1 = two_triangles()
         body, history, wrong = dccd.Body(t0, t1, FACES), dccd.History(), []

@@ -80,7 +80,7 @@ class ReportPageTest(FolderTestCase):
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
         verdict = body[body.index('id="verdict"'):body.index('id="player"')]
-        self.assertRegex(verdict, r'All 79 steps are proved.*The map was used.*First new contact.*cloth with octomap: 0\.\d{3} s after')
+        self.assertRegex(verdict, r'All 79 steps are proved.*The map was used.*First contact.*cloth with octomap: 0\.\d{3} s after')
         self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
         self.assertNotIn('id="clearance_part"', body, 'what was not asked for takes no place')
 

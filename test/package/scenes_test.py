@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import re
+import struct
 import unittest
 
 import rosbag
@@ -27,7 +28,7 @@ def analyse(scene, folder):
     assert recorded.returncode == 0, recorded.stderr
     report = folder / scene.stem
     analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet')
-    assert analysed.returncode == 0, analysed.stderr
+    assert analysed.returncode in (0, 3), analysed.stderr  # 3: not all of it is proved
     return steps_of(report), events_of(report), json.loads((report / 'report.json').read_text())
 
 
@@ -85,6 +86,25 @@ def occupied_leaves(data):
     return keys
 
 
+def occupied_leaves_of_full(data):
+    """The same of an octree with log-odds: a node is its value, a bit for each child, and its children."""
+    stream, keys, at = bytes(x & 255 for x in data), set(), 0
+
+    def walk(size, corner):
+        nonlocal at
+        value, children = struct.unpack_from('<fB', stream, at)
+        at += 5
+        for child in range(8):
+            if children >> child & 1:
+                walk(size // 2, tuple(corner[a] + (size // 2 if child >> a & 1 else 0) for a in range(3)))
+        if not children and value >= 0:
+            keys.update(tuple(corner[a] + step[a] for a in range(3)) for step in itertools.product(range(size), repeat=3))
+
+    walk(1 << 16, (0, 0, 0))
+    assert at == len(stream)
+    return keys
+
+
 class SceneFactsTest(FolderTestCase):
     def check_effects(self, monitor, report):
         """What runs is what the scene lists, each with its reason; what does not run has counted nothing."""
@@ -101,8 +121,7 @@ class SceneFactsTest(FolderTestCase):
         else:
             self.assertIsNone(report['look_ahead'])
         if 'minimum_separation_m' in monitor:
-            self.assertGreater(report['left_out']['pairs'], 100)
-            self.assertIn('%d pairs' % report['left_out']['pairs'], effects['minimum_separation']['reason'])
+            self.assertGreater(report['step_counters']['left_out_met'], 100)
 
     def test_the_facts_that_each_scene_states(self):
         scenes = sorted((CHECKOUT / 'config/scenes').glob('*.yaml'))
@@ -114,6 +133,9 @@ class SceneFactsTest(FolderTestCase):
                 self.assertTrue(text['expect'])
                 self.assertEqual(broken_facts(text['expect'], steps, {b['name'] for b in report['bodies']}, events), [])
                 self.check_effects(text['monitor'], report)
+                # What the hand leaves while the towel follows it may be what the hand brought there: it is in doubt until it is seen free.
+                least = 0.88 if scene.stem == 'grasp_and_lay' else 1
+                self.assertGreaterEqual(report['proof']['proved'], least * report['proof']['steps'])
 
     def test_the_demo_tells_its_story_and_wrong_facts_of_it_are_told(self):
         """Clear, contact with the table, with itself, clear again; and each kind of fact fails once it is wrong."""
@@ -277,9 +299,10 @@ class RobotTest(FolderTestCase):
         (static,) = (m for topic, m, _ in messages if topic == '/tf_static')
         base, = (t.transform.translation for t in static.transforms if t.child_frame_id == 'arm_base')
         self.assertEqual((base.x, base.y, base.z), (0.45, 0.6, 0))
-        # Higher than the towel and the table there is the arm alone, which the camera's map shows.
-        maps = [occupied_leaves(m.data) for topic, m, _ in messages if topic == '/octomap_binary']
-        high = [sum(key[2] - CENTER >= 1.3 / RESOLUTION_M for key in leaves) for leaves in maps]
+        # Higher than the towel and the table, and away from the walls, there is the arm alone, which the camera's map shows.
+        maps = [occupied_leaves_of_full(m.data) for topic, m, _ in messages if topic == '/octomap_full']
+        wall = 1.9 / RESOLUTION_M
+        high = [sum(x - CENTER > -wall and y - CENTER < wall and z - CENTER >= 1.3 / RESOLUTION_M for x, y, z in leaves) for leaves in maps]
         self.assertEqual(high[:2], [0, 0], 'the cell was mapped before')
         self.assertGreater(min(high[2:]), 20)
 

@@ -10,8 +10,10 @@
 #include "step/clearance/hull_pair.h"
 #include "step/parts.h"
 #include "support/clearance_truth.h"
+#include "support/closed_meshes.h"
 #include "support/generators.h"
 #include "support/query_property.h"
+#include "support/shapes.h"
 
 namespace dccd {
 namespace test {
@@ -282,6 +284,132 @@ TEST(ClearanceProperty, OfTurningBodiesHoldsOnTheArc) {
   for (const int count : {by_status[0], by_status[1], uncut, coarse}) EXPECT_GT(count, steps / 40);
 }
 
+/// A sheet in the plane z = above_m, rippled.
+Positions rippled(const Draw& draw, int side, double above_m, double ripple_m) {
+  Positions sheet;
+  for (int i = 0; i < side * side; ++i) {
+    sheet.emplace_back(i % side - side / 2, i / side - side / 2, above_m + ripple_m * 0.01 * draw(-100, 100));
+  }
+  return sheet;
+}
+
+Positions after(const Eigen::Isometry3d& motion, Positions positions) {
+  for (Vec3& p : positions) p = motion * p;
+  return positions;
+}
+
+// Sheets that face each other, somewhere askew; one turns. Nearly all of their features are nearly as
+// near as the nearest, so that a plane between the two decides, and boxes along it.
+TEST(ClearanceProperty, OfSheetsThatFaceEachOtherHoldsTheTruth) {
+  const int steps = longRun() ? 200 : 12;
+  for (int seed = 0; seed < steps; ++seed) {
+    const Draw draw = drawFrom(8800 + static_cast<std::uint64_t>(seed));
+    const auto anywhere = [&] { return Vec3(draw(-9, 9), draw(-9, 9), 10); };
+    const Eigen::Isometry3d askew =
+        Eigen::Translation3d(anywhere()) * Eigen::AngleAxisd(0.3 * draw(0, 9), anywhere().normalized());
+    const double apart_m = std::ldexp(1.0, draw(-3, 2)), ripple_m = apart_m * std::ldexp(1.0, draw(-12, -2));
+    const int side = draw(8, 12);
+    const Topology grid = Topology::grid(static_cast<std::size_t>(side), static_cast<std::size_t>(side));
+    const Positions low = rippled(draw, side, 0, ripple_m), high = rippled(draw, side, apart_m, ripple_m);
+    // At one end of the step one side is the nearest, at the other end another one.
+    const Eigen::AngleAxisd turn(0.1 * apart_m / side * draw(-9, 9), Vec3(draw(-9, 9), draw(-9, 9), 0.1).normalized());
+    const Eigen::Isometry3d start = askew * turn.inverse(), end = askew * turn;
+    Step step = stepOf(bodyOf("low", grid), after(start, low), after(end, low));
+    step.bodies.push_back(moving(bodyOf("high", grid), after(askew, high), after(draw(0, 1) == 0 ? end : askew, high)));
+    Options options;
+    options.clearance.wanted = true;
+    options.clearance.max_m = 8;
+    options.clearance.self_m = 0;
+    options.clearance.tolerance_m = std::ldexp(1.0, draw(-16, -10));
+    History history;
+    const Outcome outcome = detect(step, options, history);
+    ASSERT_EQ(outcome.clearances.size(), 1u);
+    const ClearanceDistance &last = outcome.clearances[0].at_end, &all = outcome.clearances[0].over_step;
+    const auto features = trueFeatures(step, 0), others = trueFeatures(step, 1);
+    const auto leastAt = [&](double t) {
+      double least_m = std::numeric_limits<double>::infinity();
+      for (const auto& one : features) {
+        for (const auto& other : others) least_m = std::min(least_m, roughDistance(one.second, other.second, t));
+      }
+      return least_m;
+    };
+    constexpr double ROUNDING_M = 1e-12;  // of this test's own
+    double least_m = leastAt(1);
+    ASSERT_LE(last.lower_m, least_m + ROUNDING_M) << "seed " << seed;
+    ASSERT_GE(last.upper_m, least_m - ROUNDING_M) << "seed " << seed;
+    for (const double t : {0.0, 0.375, 0.75, all.t}) least_m = std::min(least_m, leastAt(t));
+    ASSERT_LE(all.lower_m, least_m + ROUNDING_M) << "seed " << seed;
+    ASSERT_GE(all.upper_m, least_m - ROUNDING_M) << "seed " << seed;
+    for (const ClearanceDistance* d : {&last, &all}) {
+      ASSERT_EQ(d->status, ClearanceStatus::MEASURED) << "seed " << seed;
+      ASSERT_LE(d->upper_m - d->lower_m, options.clearance.tolerance_m) << "seed " << seed;
+    }
+  }
+}
+
+// What is hollow faces what is in it on all sides: no plane tells the two apart, and nearly all of their features are
+// nearly as near as the nearest. Each face has a plane of its own.
+TEST(ClearanceProperty, OfWhatIsWithinAnotherHoldsTheTruth) {
+  const int steps = longRun() ? 300 : 12;
+  int measured = 0;
+  for (int seed = 0; seed < steps; ++seed) {
+    const Draw draw = drawFrom(8900 + static_cast<std::uint64_t>(seed));
+    const auto anywhere = [&] { return Vec3(draw(-9, 9), draw(-9, 9), 10); };
+    const Eigen::Isometry3d askew =
+        Eigen::Translation3d(anywhere()) * Eigen::AngleAxisd(0.3 * draw(0, 9), anywhere().normalized());
+    const double apart_m = std::ldexp(1.0, -draw(1, 4));
+    StepBody inner = ball(Vec3::Zero(), 1, draw(1, 2)), outer = ball(Vec3::Zero(), 1.1 + apart_m, 2);
+    // It grows or shrinks, turns, and moves to one side.
+    const double grown = 1 + apart_m * draw(-4, 2) / 16;
+    const Eigen::AngleAxisd turn(0.02 * draw(-4, 4), anywhere().normalized());
+    const Vec3 aside = apart_m / 20 * anywhere().normalized() * draw(0, 4);
+    for (Vec3& p : inner.t1) p = grown * (turn * p) + aside;
+    for (StepBody* body : {&inner, &outer}) {
+      body->t0 = after(askew, body->t0);
+      body->t1 = after(askew, body->t1);
+    }
+    TestStep both;
+    both.bodies = {inner, outer};
+    const Step step = both.motion();
+    Options options;
+    options.clearance.wanted = true;
+    options.clearance.max_m = 8;
+    options.clearance.tolerance_m = std::ldexp(1.0, draw(-20, -10));
+    History history;
+    const Outcome outcome = detect(step, options, history);
+    ASSERT_EQ(outcome.clearances.size(), 1u);
+    const ClearanceDistance &last = outcome.clearances[0].at_end, &all = outcome.clearances[0].over_step;
+    if (all.status == ClearanceStatus::TOUCHING) continue;
+    ++measured;
+    const auto features = trueFeatures(step, 0), others = trueFeatures(step, 1);
+    // What is nearest by doubles, judged by rationals.
+    const auto isBelow = [&](double lower_m, double t) {
+      double least_m = std::numeric_limits<double>::infinity();
+      std::array<const TrueHull*, 2> nearest{};
+      for (const auto& one : features) {
+        for (const auto& other : others) {
+          const double distance_m = roughDistance(one.second, other.second, t);
+          if (distance_m < least_m) least_m = distance_m, nearest = {&one.second, &other.second};
+        }
+      }
+      constexpr double ROUNDING_M = 1e-12;  // of this test's own
+      return lower_m <= least_m + ROUNDING_M &&
+             Rational(lower_m) * Rational(lower_m) <= trueSquaredDistance(*nearest[0], *nearest[1], t);
+    };
+    for (const double t : {0.0, 0.375, 0.75, 1.0, all.t}) {
+      ASSERT_TRUE(isBelow(all.lower_m, t)) << "seed " << seed << " at " << t;
+    }
+    ASSERT_TRUE(isBelow(last.lower_m, 1)) << "seed " << seed;
+    ASSERT_FALSE(isBelow(last.upper_m + 1e-9, 1)) << "seed " << seed;
+    ASSERT_FALSE(isBelow(all.upper_m + 1e-9, all.t)) << "seed " << seed;
+    for (const ClearanceDistance* d : {&last, &all}) {
+      ASSERT_EQ(d->status, ClearanceStatus::MEASURED) << "seed " << seed;
+      ASSERT_LE(d->upper_m - d->lower_m, options.clearance.tolerance_m) << "seed " << seed;
+    }
+  }
+  EXPECT_GT(measured, steps / 2);
+}
+
 class ClearanceSteps : public testing::TestWithParam<int> {
  protected:
   Coordinates coordinates() const { return static_cast<Coordinates>(GetParam()); }
@@ -328,7 +456,7 @@ TEST_P(ClearanceSteps, AreTheSameInAStream) {
     const Draw draw = drawFrom(9900 + static_cast<std::uint64_t>(seed));
     const TestStep first = randomStep(draw, draw(6, 14), coordinates());
     Step step = first.motion();  // its bodies stay: what is known of one that is another body is forgotten
-    for (Body& body : step.bodies) body.reference = share(ReferenceFrame{*body.t0, {}});
+    for (Body& body : step.bodies) body.reference = body.t0;
     Options options;
     options.clearance.wanted = true;
     options.clearance.max_m = std::ldexp(1.0, draw(-4, 29));
@@ -351,7 +479,7 @@ TEST_P(ClearanceSteps, AreTheSameInAStream) {
         Body& body = step.bodies[b];
         body.t0 = body.t1;
         const int way = draw(0, 3);  // it rests, goes back to where it was at the very first, or goes on
-        if (way == 1) body.t1 = share(body.reference->positions);
+        if (way == 1) body.t1 = body.reference;
         if (way > 1) body.t1 = share(randomMotion(draw, *body.t0, coordinates()));
       }
     }

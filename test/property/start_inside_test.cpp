@@ -38,6 +38,13 @@ TestStep closedBodies(const Draw& draw, Coordinates coordinates) {
     } else {
       body = randomClosed(draw, coordinates);
     }
+    if (draw(0, 5) == 0) {  // and loose faces beside it
+      StepBody loose;
+      loose.topology = randomTopology(draw, draw(1, 2));
+      loose.t0 = randomPositions(draw, loose.topology.vertexCount(), coordinates);
+      loose.t1 = randomMotion(draw, loose.t0, coordinates);
+      body = together(body, loose);
+    }
     if (body.topology.hasFaces() && draw(0, 3) == 0) body = withOwnCorners(body);
     body.shell = draw(0, 9) == 0;
     body.self_collision = false;

@@ -33,7 +33,7 @@ struct Felt : MonitorTest {
 };
 
 // The first case of this monitor: it has not had any frame yet.
-TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
+TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndStaysWhileNothingChanges) {
   Probe<deformable_ccd::EffectArray> effects(node, "/felt/effects");
   ASSERT_TRUE(waitUntil([&] { return effects.count() > 0; })) << "before any frame";
   const std::size_t before = effects.count();
@@ -46,18 +46,15 @@ TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
   EXPECT_EQ(reasonOf("minimum_separation"), "contacts are reported from 0.12 m");
   sendBoth(1, 10);
   sendBoth(0.9, 10.1);
-  ASSERT_TRUE(waitUntil([&] { return effects.count() > before; })) << "now it knows which pairs are left out";
-  EXPECT_NE(reasonOf("minimum_separation").find("pairs of a body's own features are closer"), std::string::npos);
   for (int i = 0; i < 5; ++i) sendBoth(0.9, 10.2 + 0.1 * i);
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.6); }));
-  EXPECT_EQ(effects.count(), before + 1) << "nothing has changed since";
+  EXPECT_EQ(effects.count(), before) << "frames alone change nothing";
 }
 
 TEST_F(Felt, WhatIsLeftOutIsCounted) {
   sendBoth(1, 10);
   sendBoth(0.9, 10.1);
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
-  EXPECT_GT(stats.last().left_out_listed, 0u);
   EXPECT_GT(stats.last().left_out_met, 0u);
 }
 

@@ -124,27 +124,6 @@ TEST_F(Pressing, APhaseThatEndsIsAnAlarmForWhatGoesOnTouching) {
   EXPECT_EQ(unexpected, 1u);
 }
 
-TEST_F(Pressing, APredictionIsAboutWhatIsNotExpected) {
-  Probe<deformable_ccd::TimeToContact> prediction(node, "/pressing/time_to_contact");
-  const auto predicted = [&](double stamp_s) {
-    // 2 cm in 0.1 s, 4 cm above: it arrives after 0.2 s.
-    move(0.06, 0.04, stamp_s);
-    const ros::Time at(stamp_s + 0.1);
-    EXPECT_TRUE(waitUntil([&] { return prediction.count() > 0 && prediction.last().header.stamp == at; }));
-    return prediction.last();
-  };
-  EXPECT_TRUE(setPhase("").success);
-  const auto alarm = predicted(300);
-  EXPECT_TRUE(alarm.contact);
-  EXPECT_NEAR(alarm.seconds, 0.2, 1e-3);
-  EXPECT_EQ(alarm.expected_contacts, 0u);
-  EXPECT_TRUE(setPhase("press").success);
-  const auto quiet = predicted(310);
-  EXPECT_TRUE(quiet.answered);
-  EXPECT_GE(quiet.expected_contacts, 1u) << "found and counted";
-  EXPECT_FALSE(quiet.seconds <= alarm.seconds + 0.01) << "the tip's own arrival is no alarm";
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd

@@ -1,7 +1,6 @@
 // The live node with one mesh: messages of any type in, contacts or the reason why there are none out. With a map, and
 // with several bodies: in monitor/.
 #include <deformable_ccd/ContactArray.h>
-#include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
@@ -246,26 +245,6 @@ TEST_F(Plain, LiveChangesShowInTheParameterHashAndTouchNothingElse) {
   }
   setMesh(false);
   EXPECT_TRUE(waitUntil([&] { return hash() == before; })) << "nothing else was changed on the way";
-}
-
-TEST_F(Plain, EffectsSayWhy) {
-  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
-  send(publisher, meshStamped(tipAbove(1), 10));
-  send(publisher, meshStamped(tipAbove(0.9), 10.1));
-  Probe<deformable_ccd::EffectArray> effects(node, "/plain/effects");
-  const deformable_ccd::EffectArray plan = effects.after(0);
-  ASSERT_FALSE(plan.effects.empty());
-  for (const deformable_ccd::EffectState& effect : plan.effects) {
-    EXPECT_FALSE(effect.reason.empty()) << effect.name;
-    if (effect.name == "self_collision") {
-      EXPECT_TRUE(effect.running);
-    }
-    if (effect.name == "octomap") {
-      EXPECT_FALSE(effect.running);
-      EXPECT_EQ(effect.reason, "nobody publishes /octomap_binary and no octomap_file is given")
-          << "where it was looked for";
-    }
-  }
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <nodelet/loader.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
-#include <rosgraph_msgs/Log.h>
 #include <std_srvs/Trigger.h>
 #include <boost/make_shared.hpp>
 
@@ -207,32 +206,6 @@ TEST(Nodelet, UnloadingEndsCallsThatWaitForTheWorker) {
   EXPECT_LT(contacts.count(), static_cast<std::size_t>(FRAMES)) << "it was not busy";
   ASSERT_FALSE(answers.empty());
   EXPECT_EQ(answers.back(), "the monitor is being stopped") << "and not 10 s later that the worker is busy";
-}
-
-TEST(Nodelet, TheMapIsLookedForWhereTheNodeLooksForIt) {
-  ros::NodeHandle node;
-  Probe<rosgraph_msgs::Log> log(node, "/rosout");
-  nodelet::Loader loader;
-  ros::param::set("/defaults/fixed_frame", "world");
-  ASSERT_TRUE(loader.load("/defaults", "deformable_ccd/CollisionMonitor", {{"/mesh", "/defaults/cloth"}}, {}));
-  const std::string line =
-      "listens to mesh: /defaults/cloth (named), octomap: /octomap_binary (default), tf; publishes under /defaults";
-  EXPECT_TRUE(waitUntil([&] {
-    const auto all = log.all();
-    return std::any_of(all.begin(), all.end(), [&](const rosgraph_msgs::Log& one) { return one.msg == line; });
-  }));
-  const ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/octomap_binary", true);
-  map.publish(blockBelowZero(true));
-  const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/defaults/cloth");
-  Probe<deformable_ccd::ContactArray> contacts(node, "/defaults/contacts");
-  Probe<deformable_ccd::StepStats> stats(node, "/defaults/stats");
-  double stamp_s = 10;
-  EXPECT_TRUE(waitUntil([&] {
-    const std::size_t seen = contacts.count();
-    publisher.publish(shared(tipAbove(1), stamp_s += 0.1));
-    contacts.after(seen);
-    return stats.last().map_present;
-  })) << "the map of the pages' octomap_server";
 }
 
 TEST(Nodelet, AWrongParameterIsRefusedByName) {

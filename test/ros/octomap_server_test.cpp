@@ -27,7 +27,7 @@ constexpr double RESOLUTION_M = 0.1;
 int serve(int argc, char** argv, double slow_s) {
   ros::init(argc, argv, "emulated_octomap_server");
   ros::NodeHandle node;
-  const ros::Publisher maps = node.advertise<octomap_msgs::Octomap>("/served/octomap_binary", 1, true);
+  const ros::Publisher maps = node.advertise<octomap_msgs::Octomap>("/served/octomap_full", 1, true);
   CloudMapOptions options;
   options.resolution_m = RESOLUTION_M;
   CloudMap map(options);
@@ -51,10 +51,9 @@ int serve(int argc, char** argv, double slow_s) {
         octomap_msgs::Octomap message;
         message.header = cloud->header;
         message.header.frame_id = "world";
-        message.binary = true;
         message.id = "OcTree";
         message.resolution = RESOLUTION_M;
-        message.data = map.serialized(true);
+        message.data = map.serialized(false);
         to_send.push_back(std::move(message));
       });
   for (ros::WallRate rate(100); ros::ok(); rate.sleep()) {
@@ -113,18 +112,23 @@ TEST_F(Served, SaysWhatOfTheServersMapIsMissing) {
   const ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
   const ros::Publisher points = node.advertise<sensor_msgs::PointCloud2>("/served/points", 1);
   std::atomic<bool> tf_comes{true}, sees_sheet{false};
+  std::atomic<double> above_m{0.5};  // of where it will be seen, which the camera sees free before
   const Rate transforms(50, [&] {
     if (tf_comes) tf.publish(transformAt(ros::Time::now().toSec(), "camera", {0, 0, -1}));
   });
   const Rate sheet(30, [&] {
     const double now_s = ros::Time::now().toSec();
-    mesh.publish(meshStamped(sheetAt(sheetHeight(now_s), 4, 4), now_s));
+    mesh.publish(meshStamped(sheetAt(sheetHeight(now_s) + above_m, 4, 4), now_s));
   });
   const Rate camera(5, [&] { points.publish(seen(sees_sheet)); });
   EXPECT_TRUE(misses("no octomap has been received yet")) << "the map is late: " << state.last().reason;
 
   auto server = std::make_unique<Server>();
   EXPECT_TRUE(becomesProved()) << state.last().reason;
+  for (int k = 49; k >= 0; --k) {
+    above_m = 0.01 * k;
+    ros::Duration(0.03).sleep();
+  }
   sees_sheet = true;
   EXPECT_TRUE(ownsTheSheet()) << state.last().reason;
 

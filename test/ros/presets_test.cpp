@@ -237,7 +237,7 @@ struct OctomapServer : Preset {
 };
 
 TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
-  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/octomap_binary", true);
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/octomap_full", true);
   // The sensor saw the left half of the cloth at rest, at z = 0.31.
   map.publish(tableMap([](const Vec3& c) { return std::abs(c.z() - 0.325) < 0.03 && c.x() > -0.2 && c.x() < 0; }));
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/octomap_server/mesh");

@@ -10,8 +10,6 @@
 #include <sensor_msgs/JointState.h>
 
 #include <cstdlib>
-#include <deque>
-#include <set>
 
 #include "dccd/elementary.h"
 #include "ros/support/live_tests.h"
@@ -90,13 +88,6 @@ TEST_F(Held, TheTipMeetsTheLink) {
   EXPECT_EQ(met.touching, State::NEW) << met.reason;
   EXPECT_TRUE(waitUntil([&] { return first.count() > 0 && first.last().contact; }));
   EXPECT_NE(first.last().summary.find("plate"), std::string::npos) << first.last().summary;
-}
-
-TEST_F(Held, TheLinkMeetsTheTip) {
-  lift(110, 0.1);
-  lift(110.1, 0.25);
-  send(mesh, meshStamped(tipAbove(0.2), 110));
-  EXPECT_EQ(moveTo(0.2, 110.1).touching, State::NEW);
 }
 
 TEST_F(Held, WithoutJointStatesTheLinkIsNamed) {
@@ -220,38 +211,6 @@ TEST_F(Held, ExactIsRefusedAsLongAsSomethingAttachedHasPadding) {
   EXPECT_EQ(setAccuracy(Accuracy::EXACT), Accuracy::EXACT);
 }
 
-// Joint states at 100 Hz that come 30 ms late beside a mesh of 33 Hz: each frame waits for its link, none is lost.
-TEST_F(Held, TransformsThatAreLateAreWaitedFor) {
-  constexpr int FRAMES = 60;
-  const ros::Time begin = ros::Time::now();
-  std::deque<ros::Time> late;  // stamps, from 135 s on: robot_state_publisher takes none that go back
-  int sent = 0, ticks = 0;
-  for (ros::Rate rate(100); ticks < 3 * FRAMES + 20; ++ticks, rate.sleep()) {
-    const ros::Time now = ros::Time(135) + (ros::Time::now() - begin);
-    late.push_back(now);
-    while (now - late.front() > ros::Duration(0.03)) {
-      sensor_msgs::JointState message;
-      message.header.stamp = late.front();
-      message.name = {"lift"};
-      message.position = {0.1 + 0.05 * std::sin(5 * late.front().toSec())};
-      joints.publish(message);
-      late.pop_front();
-    }
-    if (ticks % 3 == 2 && ticks > 10 && sent < FRAMES) {
-      mesh.publish(meshStamped(tipAbove(0.4), now.toSec()));
-      ++sent;
-    }
-  }
-  const auto answers = [&] {
-    std::set<ros::Time> ends;
-    for (const State& one : state.all()) {
-      if (one.clear && one.holds_until > ros::Time(135)) ends.insert(one.holds_until);
-    }
-    return static_cast<int>(ends.size());
-  };
-  EXPECT_TRUE(waitUntil([&] { return answers() == FRAMES - 1; })) << answers() << " of " << FRAMES - 1;
-}
-
 // Nobody saw how it came there: the step is not answered. A smaller jump is a path like any other.
 TEST_F(Held, AJointThatJumpsIsASeamAndNeverClear) {
   lift(140, 0.1);
@@ -299,51 +258,6 @@ TEST_F(Changing, WhatTheHandHoldsIsExpectedUntilItIsSaidToBeOpen) {
   open.request.holds = true;
   EXPECT_NE(called("/changing/set_hold", open).message.find("mesh with plate"), std::string::npos);
   EXPECT_EQ(moveTo(0.05, begin_s + 0.3).touching, State::EXPECTED);
-}
-
-TEST_F(Changing, APhaseThatEndsTakesThePromiseWithIt) {
-  deformable_ccd::SetHold open;
-  EXPECT_TRUE(called("/changing/set_hold", open).success);
-  deformable_ccd::Named phase;
-  phase.request.name = "press";
-  EXPECT_TRUE(called("/changing/set_phase", phase).success);
-  EXPECT_EQ(moveTo(0.05, begin_s + 0.1).touching, State::EXPECTED);
-  EXPECT_EQ(promisedAt(begin_s + 0.1).seconds, 10);
-  const std::uint64_t broken = stats.after(0).promises_broken;
-  phase.request.name = "";
-  EXPECT_TRUE(called("/changing/set_phase", phase).success);
-  expectRevoked("other contacts are expected now");
-  EXPECT_EQ(moveTo(0.06, begin_s + 0.2).touching, State::NEW);
-  EXPECT_EQ(promisedAt(begin_s + 0.2).broken, "other contacts are expected now");
-  EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(begin_s + 0.2); }));
-  EXPECT_EQ(stats.last().promises_broken, broken + 1);
-  open.request.holds = true;
-  EXPECT_TRUE(called("/changing/set_hold", open).success);
-}
-
-// No promise speaks of what a live parameter changes: expectations, bodies and bounds are changed by services.
-TEST_F(Changing, ALiveParameterLeavesThePromiseAsItIs) {
-  EXPECT_TRUE(moveTo(0.3, begin_s + 0.1).clear);
-  EXPECT_GT(promisedAt(begin_s + 0.1).seconds, 0);
-  const std::size_t promised = promises.count();
-  const std::uint64_t broken = stats.after(0).promises_broken;
-  dynamic_reconfigure::Reconfigure call;
-  ASSERT_TRUE(ros::service::call("/changing/live/set_parameters", call));
-  const auto before = call.response.config;
-  call.request.config = before;
-  for (auto& value : call.request.config.ints) value.value = value.name == "max_contacts" ? 77 : value.value;
-  for (auto& value : call.request.config.doubles) value.value *= value.name == "step_budget_ms" ? 1 : 1.5;
-  ASSERT_TRUE(ros::service::call("/changing/live/set_parameters", call));
-  ros::Duration(0.3).sleep();
-  EXPECT_EQ(promises.count(), promised) << promises.last().reason;
-  for (const State& one : state.all())
-    EXPECT_TRUE(one.clear || one.holds_until != ros::Time(begin_s + 0.1)) << one.reason;
-  EXPECT_TRUE(moveTo(0.3, begin_s + 0.2).clear);
-  EXPECT_EQ(promisedAt(begin_s + 0.2).broken, "");
-  EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(begin_s + 0.2); }));
-  EXPECT_EQ(stats.last().promises_broken, broken);
-  call.request.config = before;
-  ASSERT_TRUE(ros::service::call("/changing/live/set_parameters", call));
 }
 
 TEST_F(Changing, ADescriptionThatChangesIsNotVouchedForUntilItIsBack) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Runs worlds of the storm: storm.py [--from SEED] [--worlds N | --cases] [--log FILE] [--keep DIR] [--smaller]; with --smaller it also says which
-faults of a refuted world are needed for what is refuted."""
+"""Runs worlds of the storm: storm.py [--from SEED] [--worlds N | --cases] [--live] [--log FILE] [--keep DIR] [--smaller]; with --smaller it also says
+which faults of a refuted world are needed for what is refuted; with --live the node answers in place of analyze_bag."""
 import argparse
 import collections
 import copy
@@ -56,8 +56,10 @@ def kind_of(row, role):
 Verdict = collections.namedtuple('Verdict', 'refuted kinds not_covered held statuses problem')
 
 
-def judge(world, folder):
-    """What analyze_bag says of the world, held against what came."""
+def judge(world, folder, live=False):
+    """What analyze_bag, or the node, says of the world, held against what came."""
+    if live:  # one process publishes
+        world.rows = [row for row in world.rows if row[3] == row[0]]
     folder = pathlib.Path(folder)
     bag, params, out = folder / 'world.bag', folder / 'params.yaml', folder / 'out.bag'
     connections = {}
@@ -74,8 +76,9 @@ def judge(world, folder):
     params.write_text(yaml.safe_dump(world.params))
     (folder / 'finger.obj').write_text(worlds.FINGER_OBJ)
     (folder / 'arm.urdf').write_text(worlds.ROBOT)
-    ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--params', str(params), '-o', str(out), '--report', str(folder / 'report'),
-                          '--quiet'], capture_output=True, text=True, check=False)
+    command = [sys.executable, str(HERE / 'live.py'), str(folder)] if live else [
+        str(TOOLS / 'analyze_bag'), str(bag), '--params', str(params), '-o', str(out), '--report', str(folder / 'report'), '--quiet']
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if ran.returncode not in (0, 3):
         return Verdict([], [], [], 0, collections.Counter(), ran.stderr.strip()[-400:])
     arguments = argparse.Namespace(steps=None, pairs=500)
@@ -112,7 +115,7 @@ def smaller(seed, folder, wanted):
 def one(seed, folder, arguments):
     """The row of the log: what became of a world."""
     world = cases.case(seed, folder) if arguments.cases else worlds.World(seed, folder)
-    verdict = judge(world, folder)
+    verdict = judge(world, folder, arguments.live)
     row = {'seed': seed, 'kinds': verdict.kinds, 'held': verdict.held, 'faults': world.faults,
            'not_covered': [r['reason'] for r in verdict.not_covered], 'statuses': dict(verdict.statuses), 'problem': verdict.problem,
            'first': verdict.refuted[:1], 'tame': world.tame}
@@ -126,6 +129,7 @@ def main():
     parser.add_argument('--from', dest='first', type=int, default=1)
     parser.add_argument('--worlds', type=int, default=300)
     parser.add_argument('--cases', action='store_true')
+    parser.add_argument('--live', action='store_true')
     parser.add_argument('--log')
     parser.add_argument('--keep')
     parser.add_argument('--smaller', action='store_true')

@@ -250,7 +250,6 @@ class World:
         one = p['bodies'][r.choice(names)]
         if 'accuracy' in p and r.random() < .5:
             one['uncertainty'] = {'radius_m': r.choice([.001, .005])}
-            one['self_collision'] = False
         if 'accuracy' in p and r.random() < .3 and len(names) > 1:
             p['minimum_separation_pairs'] = [{'between': r.sample(names, 2), 'separation_m': r.choice([0, .004, .02])}]
         if r.random() < .2:

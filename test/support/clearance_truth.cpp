@@ -198,7 +198,7 @@ std::vector<std::array<TrueHull, 2>> askedPairs(const Step& step, const Options&
   std::vector<std::vector<double>> way;
   if (itself) {
     const Body& body = step.bodies[row.body[0]];
-    way = waysOf(*body.topology, body.reference ? body.reference->positions : *body.t0);
+    way = waysOf(*body.topology, body.reference ? *body.reference : *body.t0);
   }
   for (std::size_t i = 0; i < first.size(); ++i) {
     for (std::size_t j = itself ? i + 1 : 0; j < second.size(); ++j) {

@@ -51,7 +51,7 @@ std::string judgeStep(const TestStep& step) {
       const Outcome result = sought ? runOnce(step, options) : bruteForce(step.motion(), options);
       std::string wrong = judgeContacts(result.contacts, contacts, options.accuracy.toc_bits);
       if (wrong.empty()) wrong = judgeStart(result, start);
-      if (wrong.empty() && !result.claim.holds()) wrong = "it was not all looked at";
+      if (wrong.empty() && !result.claim.isCovered()) wrong = "it was not all looked at";
       if (wrong.empty() || !finding.empty()) continue;
       finding = (sought ? "clustered, " : "brute force, ") + target + ": " + wrong;
     }
@@ -76,7 +76,7 @@ std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests
     if (!wrong.empty()) return where + "carried over: " + wrong;
     const std::string other = difference(result.contacts, expected.contacts);
     if (!other.empty()) return where + other;
-    if (!result.claim.holds()) return where + "it was not all looked at";
+    if (!result.claim.isCovered()) return where + "it was not all looked at";
     if (must_be_clear && result.start_state != StartState::CLEAR)
       return where + "INTERSECTING after CLEAR without contact";
     must_be_clear =

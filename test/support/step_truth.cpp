@@ -117,7 +117,28 @@ std::vector<Face> mergedFaces(const StepBody& body) {
   return merged;
 }
 
-/// The faces that enclose space; none where there is a border, though vertices are merged, or a vertex does not count.
+/// The faces of those parts, joined by vertices, that are closed: by walking from face to face.
+std::vector<Face> closedParts(std::vector<Face> left) {
+  std::vector<Face> found;
+  while (!left.empty()) {
+    std::vector<Face> part{left.back()}, others;
+    left.pop_back();
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      others.clear();
+      for (const Face& f : left) {
+        const bool meets = std::any_of(
+            f.begin(), f.end(), [&, at = part[i]](Index v) { return std::find(at.begin(), at.end(), v) != at.end(); });
+        (meets ? part : others).push_back(f);
+      }
+      left = others;
+    }
+    if (isClosed(part)) found.insert(found.end(), part.begin(), part.end());
+  }
+  return found;
+}
+
+/// The faces that enclose space: all, also where vertices are merged, or else those of the parts that are closed; none
+/// where a vertex does not count.
 std::vector<Face> enclosingFaces(const StepBody& body) {
   for (const Face& f : body.topology.faces()) {
     if (!isActive(body, f.data(), 3)) return {};
@@ -125,7 +146,7 @@ std::vector<Face> enclosingFaces(const StepBody& body) {
   if (body.shell) return {};
   if (isClosed(body.topology.faces())) return body.topology.faces();
   const std::vector<Face> merged = mergedFaces(body);
-  return isClosed(merged) ? merged : std::vector<Face>();
+  return isClosed(merged) ? merged : closedParts(body.topology.faces());
 }
 
 /// Of the vertices that edges join the one with the smallest number, for each piece; ascending.

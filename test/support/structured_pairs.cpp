@@ -28,6 +28,21 @@ Place flat(double z0, double z1, double shift = 0) {
 /// In a plane that is not one of the axes', at rest.
 Point tilted(double x, double y) { return {x, 0.8 * y, 0.3 * x + 0.6 * y}; }
 
+/// The same turned into a plane along no axis, in which only rounding does not let it stay.
+Place askew(const Place& place) {
+  return [place](double x, double y, int time) {
+    const Point p = place(x, y, time);
+    return Point{(2 * p[0] - p[1] + 2 * p[2]) / 3, (2 * p[0] + 2 * p[1] - p[2]) / 3, (2 * p[1] + 2 * p[2] - p[0]) / 3};
+  };
+}
+
+/// In one plane, from `from` on by so many cells.
+Place sliding(int cells, double from, double by) {
+  return [=](double x, double y, int time) {
+    return Point{x + (from + time * by) / cells, y + 0.6 * from / cells + 0.1 * time / cells, 0};
+  };
+}
+
 std::vector<Sheets> families(int cells) {
   const double half = 0.5 / cells;
   return {
@@ -48,6 +63,17 @@ std::vector<Sheets> families(int cells) {
       {"sliding in one plane", flat(0, 0),
        [=](double x, double y, int time) {
          return Point{x + time * 2 * half, y + 0.3 * half, 0};
+       }},
+      {"sliding in a plane along no axis", askew(sliding(cells, 0, -0.4)), askew(sliding(cells, 0.3, 0.5))},
+      {"sliding far in a plane along no axis", askew(sliding(cells, 0, -1.5)), askew(sliding(cells, 0.3, 2))},
+      {"sliding in a plane at 45 degrees",
+       [=](double x, double y, int time) {
+         const Point p = sliding(cells, 0, -0.4)(x, y, time);
+         return Point{p[0], p[1], p[0]};
+       },
+       [=](double x, double y, int time) {
+         const Point p = sliding(cells, 0.3, 0.5)(x, y, time);
+         return Point{p[0], p[1], p[0]};
        }},
       {"integer coordinates",
        [=](double x, double y, int) {

@@ -54,13 +54,10 @@ bool meetAtEnd(const MovingHull& a, const LeafBox& box) {
 void ClearanceFinder::learn(const Body& body, const SceneBody& scene_body, BodyState& state) const {
   const std::size_t vertices = body.topology->vertexCount();
   if (!body.t0 || body.t0->size() != vertices) return;  // the step will be refused
-  if (!state.first_t0) state.first_t0 = body.t0;
   if (!state.tree.isBuilt()) state.tree.build(scene_body, *body.t0);
   if (!meetsItself(body) || state.tree.empty() || state.self_m == options_.self_m) return;
-  const bool has_reference = body.reference && body.reference->positions.size() == vertices;
   state.self_m = 0;  // should memory end, they are half of one and half of the other
-  state.neighbours.set(*body.topology, has_reference ? body.reference->positions : *state.first_t0, options_.self_m,
-                       state.tree);
+  state.neighbours.set(*body.topology, body.reference ? *body.reference : *body.t0, options_.self_m, state.tree);
   state.self_m = options_.self_m;
   state.far_at.clear();
 }

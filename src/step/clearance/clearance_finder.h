@@ -53,9 +53,8 @@ class DCCD_HIDDEN ClearanceFinder {
     double leaves_way_m = 0;               // how far its straight paths do at most
     FeatureTree tree;
     SurfaceNeighbours neighbours;
-    double self_m = 0;                          // of the neighbours; 0: they are not known
-    std::shared_ptr<const Positions> first_t0;  // where the body was first, the reference frame where it has none
-    Positions far_at;                           // by slots, where it was when it was known to be far_m from itself
+    double self_m = 0;  // of the neighbours; 0: they are not known
+    Positions far_at;   // by slots, where it was when it was known to be far_m from itself
     double far_m = 0;
     bool known = false;                          // in this part: it has features, and all of them have bounds
     bool fitted = false, fitted_to_map = false;  // the tree's boxes are of this stretch

@@ -100,19 +100,19 @@ StepBox FeatureTree::itemBox(std::uint32_t feature) const {
   return box;
 }
 
-double FeatureTree::leafReach(std::uint32_t leaf, const Vec3& direction, bool at_end) const {
-  double reach_m = -std::numeric_limits<double>::infinity();
+Reach FeatureTree::leafReach(std::uint32_t leaf, const Turning& along) const {
+  Reach reach = Reach::none();
   for (std::size_t i = nodes_[leaf].vertices; i < nodes_[leaf].vertices_end; ++i)
-    reach_m = std::max(reach_m, reachOf(leaf_slots_[i], direction, at_end));
-  return reach_m;
+    reach.add(vertices_[leaf_slots_[i]], along);
+  return reach;
 }
 
-double FeatureTree::itemReach(std::uint32_t feature, const Vec3& direction, bool at_end) const {
-  double reach_m = -std::numeric_limits<double>::infinity();
+Reach FeatureTree::itemReach(std::uint32_t feature, const Turning& along) const {
+  Reach reach = Reach::none();
   for (const Index slot : slots_[feature]) {
-    if (slot != NO_INDEX) reach_m = std::max(reach_m, reachOf(slot, direction, at_end));
+    if (slot != NO_INDEX) reach.add(vertices_[slot], along);
   }
-  return reach_m;
+  return reach;
 }
 
 MovingHull FeatureTree::itemHull(std::uint32_t feature) const {
@@ -123,6 +123,21 @@ MovingHull FeatureTree::itemHull(std::uint32_t feature) const {
     hull.addCorner(Vec3(v.t0[0], v.t0[1], v.t0[2]), Vec3(v.t1[0], v.t1[1], v.t1[2]));
   }
   return hull;
+}
+
+Turning FeatureTree::itemNormal(std::uint32_t feature) const {
+  Turning normal{Vec3::Zero(), Vec3::Zero()};
+  const Feature& slots = slots_[feature];
+  if (slots[2] == NO_INDEX) return normal;
+  for (int end = 0; end < 2; ++end) {
+    const auto at = [&](int k) {
+      return Eigen::Map<const Vec3>(end == 0 ? vertices_[slots[k]].t0 : vertices_[slots[k]].t1);
+    };
+    const Vec3 across = (at(1) - at(0)).cross(at(2) - at(0));
+    const double length = across.norm();
+    if (length > tolerance::CLEARANCE_DIRECTION_M) normal[end] = across / length;
+  }
+  return normal;
 }
 
 void FeatureTree::refit(const VertexMotion* vertices) {

@@ -39,12 +39,24 @@ class FeatureTree {
     f(node + 1);
     f(nodes_[node].right);
   }
+  /// Calls f(vertex) for each corner of a leaf's features.
+  template <class F>
+  void forCorners(std::uint32_t leaf, F&& f) const {
+    for (std::size_t i = nodes_[leaf].vertices; i < nodes_[leaf].vertices_end; ++i) f(vertices_[leaf_slots_[i]]);
+  }
+  template <class F>
+  void forItemCorners(std::uint32_t feature, F&& f) const {
+    for (const Index slot : slots_[feature]) {
+      if (slot != NO_INDEX) f(vertices_[slot]);
+    }
+  }
   const std::vector<Feature>& features() const { return features_; }
   StepBox itemBox(std::uint32_t feature) const;
-  /// How far it reaches along a direction in the step, or at its end alone.
-  double leafReach(std::uint32_t leaf, const Vec3& direction, bool at_end) const;
-  double itemReach(std::uint32_t feature, const Vec3& direction, bool at_end) const;
+  Reach leafReach(std::uint32_t leaf, const Turning& along) const;
+  Reach itemReach(std::uint32_t feature, const Turning& along) const;
   MovingHull itemHull(std::uint32_t feature) const;
+  /// Unit vectors across a face at either end of the step; zero where there is none.
+  Turning itemNormal(std::uint32_t feature) const;
 
  private:
   struct Node {
@@ -60,13 +72,6 @@ class FeatureTree {
   std::vector<Feature> features_;
   std::vector<Feature> slots_;  // the same by slots
   std::vector<Node> nodes_;
-  double reachOf(Index slot, const Vec3& direction, bool at_end) const {
-    const VertexMotion& v = vertices_[slot];
-    const double end = direction[0] * v.t1[0] + direction[1] * v.t1[1] + direction[2] * v.t1[2];
-    if (at_end) return end;
-    return std::max(end, direction[0] * v.t0[0] + direction[1] * v.t0[1] + direction[2] * v.t0[2]);
-  }
-
   std::vector<Index> leaf_slots_;  // of each leaf, once each
   std::vector<StepBox> boxes_;
   const VertexMotion* vertices_ = nullptr;

@@ -32,12 +32,8 @@ class DCCD_HIDDEN MapBoxes {
     }
   }
   static constexpr std::uint32_t LEAF = 1;
-  double itemReach(std::uint32_t item, const Vec3& direction, bool at_end) const {
-    return itemBox(item).reach(direction, at_end);
-  }
-  double leafReach(std::uint32_t leaf, const Vec3& direction, bool at_end) const {
-    return itemReach(leaf, direction, at_end);
-  }
+  Reach itemReach(std::uint32_t item, const Turning& along) const { return itemBox(item).reach(along); }
+  Reach leafReach(std::uint32_t leaf, const Turning& along) const { return itemReach(leaf, along); }
   std::uint32_t first(std::uint32_t leaf) const { return leaf; }
   std::uint32_t count(std::uint32_t) const { return 1; }
 

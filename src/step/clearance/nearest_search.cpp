@@ -22,7 +22,9 @@ void NearestSearch::begin(const Goal& goal, const FoundDistance& known) {
   found_.cut = false;
   looks_ = 0;
   number_ = 1;
-  direction_from_ = 0;
+  checked_from_ = 0;
+  has_direction_ = false;
+  if (!goal.first) plane_ = 0;
   touching_.clear();
   heap_.clear();
   setEnough();
@@ -56,13 +58,17 @@ Nearest NearestSearch::takeAt(double t) {
     for (int side = 0; side < 2; ++side) found_.point[side] = pair_.pointInMetres(nearest.point[side]);
     found_.item = item_;
     setEnough();
-    if (nearest.direction != Vec3::Zero()) {
-      direction_ = nearest.direction;
-      direction_from_ = number_;
-      ++directions_;
-    }
   }
   return nearest;
+}
+
+/// What is pushed later is held against it at once.
+void NearestSearch::setDirection(const Turning& direction) {
+  if (direction[0] == Vec3::Zero() || direction[1] == Vec3::Zero()) return;
+  direction_ = direction;
+  ++directions_;
+  checked_from_ = number_;
+  has_direction_ = true;
 }
 
 /// The pair meets at the end.
@@ -81,14 +87,16 @@ void NearestSearch::takeMeeting() {
 void NearestSearch::refine() {
   std::array<Interval, 64> left;  // a path to one interval leaves one beside each of its halvings
   std::size_t count = 1;
+  const double upper_m = found_.upper_m;
   const Vec3 at_end = takeAt(1).direction;
+  Vec3 at_start = Vec3::Zero();
   left[0] = {0, 1, 0, {at_end, at_end}};
   for (int halvings = 0; count > 0; ++halvings) {
     Interval one = left[--count];
     one.lower = std::max(one.lower, pair_.lowerOver(one.direction, one.from, one.to));
     double lower_m = pair_.lowerInMetres(one.lower);
     if (lower_m < enough_m_ && halvings == 0) {
-      one.direction[0] = takeAt(0).direction;
+      one.direction[0] = at_start = takeAt(0).direction;
       one.lower = std::max(one.lower, pair_.lowerOver(one.direction, 0, 1));
       lower_m = pair_.lowerInMetres(one.lower);
     }
@@ -104,6 +112,7 @@ void NearestSearch::refine() {
     left[count++] = {middle, one.to, one.lower, {direction, one.direction[1]}};
     left[count++] = {one.from, middle, one.lower, {one.direction[0], direction}};
   }
+  if (found_.upper_m < upper_m) setDirection({at_start == Vec3::Zero() ? takeAt(0).direction : at_start, at_end});
 }
 
 }  // namespace dccd

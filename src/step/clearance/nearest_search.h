@@ -1,7 +1,14 @@
 // The smallest distance of two trees of features: branch and bound, always on with the pair of boxes that may be
 // nearest, until none that is left can be nearer than what was found by more than the tolerance. Boxes leave much
 // between them and what is in them. So a pair is also held against the direction in which the nearest two so far are
-// apart: along it, things that bulge towards each other are no nearer beside these two.
+// apart: along it, things that bulge towards each other are no nearer beside these two. Where that is not the end soon,
+// a plane is looked for between the two trees. Most often it shows at once that nothing is nearer. If not, boxes along
+// it are tight for things that face each other, which boxes along x, y and z are not.
+//
+// Directions turn with the step, as the nearest two do. Any unit vectors will do for a proof, only its arithmetic must
+// be bounded. With u = HALF_ULP and L the largest coordinate: n.p by its three operations 6 u L, once more for a mean;
+// the difference of two 12 u L and its own rounding 4 u L; axes are across each other but for 10 u, so that they make a
+// distance of at most 4 L longer by 80 u L. In all 100 u L. slack_m_ is CLEARANCE L, which is 256 u L.
 //
 // The answer depends on the two trees alone, not on what was found in the step before: the search goes to the nearest
 // boxes first and so has a near pair after as many boxes as the trees are high.
@@ -11,11 +18,14 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dccd/types.h"
 #include "step/clearance/hull_pair.h"
 #include "step/clearance/step_box.h"
+#include "step/clearance/turned_box.h"
 
 namespace dccd {
 
@@ -50,15 +60,26 @@ class NearestSearch {
   template <class A, class B, class Pairs, class Meet>
   FoundDistance run(const A& a, const B& b, Pairs&& pairs, const Goal& goal, const FoundDistance& known,
                     const Meet& meet) {
+    // A map has no shape that a plane would part from others, and its corners are many.
+    constexpr bool FINDS_PLANE = B::LEAF > 1 && !std::decay_t<Pairs>::ITSELF;
     begin(goal, known);
     slack_m_ = tolerance::CLEARANCE * std::max(a.box(a.root()).largest(), b.box(b.root()).largest());
     if (goal.first) {
       compare(a, b, {0, 0, (*goal.first)[0], (*goal.first)[1], true}, meet);
+      if constexpr (FINDS_PLANE) {
+        if (prunesAll(a, b)) return result();
+      }
     } else if (!pairs.ITSELF) {
       compareNearBoxes(a, b, meet);
     }
     push(a, a.root(), b, b.root(), pairs);
-    while (!touching_.empty() || !heap_.empty()) {
+    for (std::uint32_t taken = 0; !touching_.empty() || !heap_.empty(); ++taken) {
+      if constexpr (FINDS_PLANE) {
+        if (taken == FEW && enough_m_ > 0) {
+          findPlane(a, b, meet);
+          if (prunesAll(a, b)) return result();
+        }
+      }
       Pair pair = take();
       const bool is_done = prunes(pair.squared);  // nothing else is nearer
       if (is_done || isLate()) {
@@ -66,9 +87,9 @@ class NearestSearch {
         settleSquared(pair.squared);
         break;
       }
-      if (pair.number < direction_from_) {
+      if (pair.number < checked_from_) {
         const double squared = pair.squared;
-        if (prunesAlong(a, b, pair)) continue;
+        if (prunesAnew(a, b, pair)) continue;
         if (pair.squared > squared) {
           put(pair);
           continue;
@@ -109,11 +130,24 @@ class NearestSearch {
     }
   };
 
-  static constexpr std::uint32_t MOST_KNOWN = 64;  // features of a node whose reach is that of its vertices
+  static constexpr std::uint32_t MOST_KNOWN = 64;    // features of a node whose reach is that of its vertices
+  static constexpr std::uint32_t MOST_TURNED = 256;  // … whose turned box is
+  static constexpr std::uint32_t FEW = 64;           // pairs that are taken before a plane is looked for
+  static constexpr std::size_t MOST_PLANES = 16;     // that are tried at either end of the step
   /// Of a node, along the direction of that number.
-  struct Reach {
+  struct KnownReach {
     std::uint64_t direction = 0;
-    double reach_m = 0;
+    Reach reach{{0, 0, 0}};
+  };
+  /// The corner of a tree's items that reaches furthest, and its leaf.
+  struct Furthest {
+    double reach_m = -std::numeric_limits<double>::infinity();
+    std::uint32_t leaf = 0;
+    VertexMotion corner{};
+  };
+  struct KnownBox {
+    std::uint64_t plane = 0;
+    TurnedBox box;
   };
 
   /// What touches comes before all else, in whatever order, but items before nodes.
@@ -143,7 +177,8 @@ class NearestSearch {
   void push(const A& a, std::uint32_t in_a, const B& b, std::uint32_t in_b, Pairs& pairs) {
     const double squared = squaredGap(a.box(in_a), b.box(in_b), goal_.at_end ? 1 : 0);
     Pair pair{squared, number_, in_a, in_b, false};
-    if (prunes(squared) || pairs.asked(in_a, in_b) == 0 || prunesAlong(a, b, pair)) return;
+    if (prunes(squared) || pairs.asked(in_a, in_b) == 0) return;
+    if (prunesAnew(a, b, pair)) return;
     if (a.isLeaf(in_a) && b.isLeaf(in_b) && prunesBetween(a, a.box(in_a), b, b.box(in_b), pair)) return;
     add(pair);
   }
@@ -151,41 +186,53 @@ class NearestSearch {
   template <class A, class B, class Pairs>
   void pushItems(const A& a, std::uint32_t in_a, const B& b, std::uint32_t in_b, Pairs& pairs) {
     const std::uint32_t asked = pairs.asked(in_a, in_b);
-    for (std::uint32_t i = 0; i < a.count(in_a); ++i) {
+    std::array<StepBox, B::LEAF> others;
+    std::array<TurnedBox, B::LEAF> turned_others;
+    std::uint32_t left = 0;  // of the second leaf's items
+    for (std::uint32_t j = 0; j < b.count(in_b); ++j) {
+      if (prunesBeyond(b, b.first(in_b) + j, a, in_a)) continue;
+      left |= 1u << j;
+      others[j] = b.itemBox(b.first(in_b) + j);
+      if (plane_ > 0) turned_others[j] = turnedItem(b, b.first(in_b) + j);
+    }
+    for (std::uint32_t i = 0; i < a.count(in_a) && left != 0; ++i) {
+      if (prunesBeyond(a, a.first(in_a) + i, b, in_b)) continue;
       const StepBox box = a.itemBox(a.first(in_a) + i);
+      TurnedBox turned_box;
+      if (plane_ > 0) turned_box = turnedItem(a, a.first(in_a) + i);
       for (std::uint32_t j = 0; j < b.count(in_b); ++j) {
-        if ((asked >> (A::LEAF * i + j) & 1) == 0) continue;
-        const StepBox other = b.itemBox(b.first(in_b) + j);
-        const double squared = squaredGap(box, other, goal_.at_end ? 1 : 0);
+        if ((asked >> (A::LEAF * i + j) & 1) == 0 || (left >> j & 1) == 0) continue;
+        const double squared = squaredGap(box, others[j], goal_.at_end ? 1 : 0);
         Pair pair{squared, number_, a.first(in_a) + i, b.first(in_b) + j, true};
-        if (!prunes(squared) && !prunesAlong(a, b, pair) && !prunesBetween(a, box, b, other, pair)) add(pair);
+        if (prunes(squared) || (plane_ > 0 && prunesTurned(turned_box, turned_others[j], pair))) continue;
+        if (!prunesAlong(a, b, pair) && !prunesBetween(a, box, b, others[j], pair)) add(pair);
       }
     }
   }
 
-  /// Of a tree's node or item, how far it reaches along the direction, from the start (of the end alone: from the end)
-  /// to the end of the step.
+  /// Of a tree's node or item, how far it reaches along the direction.
   template <class Tree>
-  double reach(const Tree& tree, std::uint32_t in, bool items, double sign, std::vector<Reach>& known) {
-    const Vec3 direction = sign * direction_;
-    if (items) return tree.itemReach(in, direction, goal_.at_end);
+  Reach reach(const Tree& tree, std::uint32_t in, bool items, std::size_t side) {
+    const double sign = side == 0 ? -1 : 1;
+    const Turning along{sign * direction_[0], sign * direction_[1]};
+    if (items) return tree.itemReach(in, along);
     if constexpr (Tree::LEAF > 1) {
       if (tree.count(in) <= MOST_KNOWN) {
+        std::vector<KnownReach>& known = reach_[side];
         if (known.size() < tree.nodeCount()) known.resize(tree.nodeCount());
         if (known[in].direction != directions_) {
-          double reach_m = -std::numeric_limits<double>::infinity();
+          Reach all = Reach::none();
           if (tree.isLeaf(in)) {
-            reach_m = tree.leafReach(in, direction, goal_.at_end);
+            all = tree.leafReach(in, along);
           } else {
-            tree.forChildren(
-                in, [&](std::uint32_t child) { reach_m = std::max(reach_m, reach(tree, child, false, sign, known)); });
+            tree.forChildren(in, [&](std::uint32_t child) { all.add(reach(tree, child, false, side)); });
           }
-          known[in] = {directions_, reach_m};
+          known[in] = {directions_, all};
         }
-        return known[in].reach_m;
+        return known[in].reach;
       }
     }
-    return tree.box(in).reach(direction, goal_.at_end);
+    return tree.box(in).reach(along);
   }
 
   /// Whether what two are certainly apart shows that they need no further look. If not, they may be farther than their
@@ -201,22 +248,189 @@ class NearestSearch {
   }
   template <class A, class B>
   bool prunesAlong(const A& a, const B& b, Pair& pair) {
-    if (!(enough_m_ > 0) || direction_from_ == 0) return false;
-    const double reach_m = reach(a, pair.a, pair.items, -1, reach_[0]) + reach(b, pair.b, pair.items, 1, reach_[1]);
-    return prunesApart(-reach_m, pair);
+    if (!(enough_m_ > 0) || !has_direction_) return false;
+    return prunesApart(apartBy(reach(a, pair.a, pair.items, 0), reach(b, pair.b, pair.items, 1), goal_.at_end), pair);
+  }
+
+  template <class Tree>
+  TurnedBox turnedItem(const Tree& tree, std::uint32_t item) const {
+    if constexpr (Tree::LEAF > 1) {
+      TurnedBox box = TurnedBox::none();
+      tree.forItemCorners(item, [&](const VertexMotion& corner) { box.add(corner, axes_); });
+      return box;
+    }
+    return TurnedBox::of(tree.itemBox(item), axes_);
+  }
+  /// Of a tree's node, in the axes of the plane.
+  template <class Tree>
+  TurnedBox turned(const Tree& tree, std::uint32_t in, std::size_t side) {
+    if constexpr (Tree::LEAF > 1) {
+      if (tree.count(in) <= MOST_TURNED) {
+        std::vector<KnownBox>& known = turned_[side];
+        if (known.size() < tree.nodeCount()) known.resize(tree.nodeCount());
+        if (known[in].plane != plane_) {
+          TurnedBox all = TurnedBox::none();
+          if (tree.isLeaf(in)) {
+            tree.forCorners(in, [&](const VertexMotion& corner) { all.add(corner, axes_); });
+          } else {
+            tree.forChildren(in, [&](std::uint32_t child) { all.add(turned(tree, child, side)); });
+          }
+          known[in] = {plane_, all};
+        }
+        return known[in].box;
+      }
+    }
+    return TurnedBox::of(tree.box(in), axes_);
+  }
+  /// Of a pair that was pushed before the plane or the direction was known.
+  template <class A, class B>
+  bool prunesAnew(const A& a, const B& b, Pair& pair) {
+    if (plane_ == 0 || pair.items) return prunesAlong(a, b, pair);
+    return prunesTurned(turned(a, pair.a, 0), turned(b, pair.b, 1), pair);
+  }
+  bool prunesTurned(const TurnedBox& a, const TurnedBox& b, Pair& pair) {
+    const double squared = squaredGap(a, b, slack_m_, goal_.at_end);
+    pair.squared = std::max(pair.squared, squared);
+    return prunes(squared);
   }
   /// The same of two leaves or items in the direction from one to the other: what is hollow is nearly as near in many.
   template <class A, class B>
   bool prunesBetween(const A& a, const StepBox& box_a, const B& b, const StepBox& box_b, Pair& pair) {
     if (!(enough_m_ > 0)) return false;
-    const Vec3 between = box_a.middle(goal_.at_end) - box_b.middle(goal_.at_end);
-    const double length = between.norm();
-    if (!(length > tolerance::CLEARANCE_DIRECTION_M)) return false;
-    const Vec3 direction = between / length;
-    const auto reachOf = [&](const auto& tree, std::uint32_t in, const Vec3& along) {
-      return pair.items ? tree.itemReach(in, along, goal_.at_end) : tree.leafReach(in, along, goal_.at_end);
+    Turning from_a, from_b;
+    for (int end = 0; end < 2; ++end) {
+      const Vec3 between = box_a.middle(end) - box_b.middle(end);
+      const double length = between.norm();
+      if (!(length > tolerance::CLEARANCE_DIRECTION_M)) return false;
+      from_b[end] = between / length;
+      from_a[end] = -from_b[end];
+    }
+    const auto reachOf = [&](const auto& tree, std::uint32_t in, const Turning& along) {
+      return pair.items ? tree.itemReach(in, along) : tree.leafReach(in, along);
     };
-    return prunesApart(-reachOf(a, pair.a, -direction) - reachOf(b, pair.b, direction), pair);
+    return prunesApart(apartBy(reachOf(a, pair.a, from_a), reachOf(b, pair.b, from_b), goal_.at_end), pair);
+  }
+
+  /// Whether a face's own plane shows that a leaf of the other tree needs no further look. Of things that face each
+  /// other and bend, each face has another plane beyond which all lies that is near it.
+  template <class Tree, class Other>
+  bool prunesBeyond(const Tree& tree, std::uint32_t item, const Other& other, std::uint32_t leaf) {
+    if constexpr (Tree::LEAF > 1 && Other::LEAF > 1) {
+      Turning out = tree.itemNormal(item);
+      if (!(enough_m_ > 0) || out[0] == Vec3::Zero() || out[1] == Vec3::Zero()) return false;
+      const StepBox box = other.box(leaf), own = tree.itemBox(item);
+      for (int end = 0; end < 2; ++end) {
+        if (out[end].dot(box.middle(end) - own.middle(end)) < 0) out[end] = -out[end];
+      }
+      const Turning back{-out[0], -out[1]};
+      Pair all{};
+      return prunesApart(apartBy(tree.itemReach(item, out), other.leafReach(leaf, back), goal_.at_end), all);
+    }
+    return false;
+  }
+
+  /// Of all of a tree's corners, by one coefficient of their reach along a direction.
+  template <class Tree>
+  Furthest furthest(const Tree& tree, const Turning& along, std::size_t which) {
+    Furthest found;
+    open_.assign(1, {std::numeric_limits<double>::infinity(), tree.root()});
+    while (!open_.empty()) {
+      const auto [box_m, in] = open_.back();
+      open_.pop_back();
+      if (box_m <= found.reach_m) continue;
+      if (tree.isLeaf(in)) {
+        tree.forCorners(in, [&](const VertexMotion& corner) {
+          const double reach_m = Reach::of(corner, along, which);
+          if (reach_m > found.reach_m) found = {reach_m, in, corner};
+        });
+        continue;
+      }
+      tree.forChildren(in, [&](std::uint32_t child) {
+        const double reach_m = tree.box(child).reach(along, which);
+        if (reach_m <= found.reach_m) return;
+        open_.emplace_back(reach_m, child);
+        const std::size_t last = open_.size() - 1;  // the one that reaches furthest comes first
+        if (last > 0 && open_[last - 1].first > reach_m) std::swap(open_[last - 1], open_[last]);
+      });
+    }
+    return found;
+  }
+
+  /// Of a leaf's items the one that faces a direction most.
+  template <class Tree>
+  std::uint32_t facing(const Tree& tree, std::uint32_t leaf, const Vec3& n, int end) {
+    std::uint32_t best = tree.first(leaf);
+    double most_m = -std::numeric_limits<double>::infinity();
+    for (std::uint32_t item = tree.first(leaf); item < tree.first(leaf) + tree.count(leaf); ++item) {
+      const MovingHull hull = tree.itemHull(item);
+      double reach_m = 0;
+      for (std::size_t k = 0; k < hull.count; ++k) reach_m += n.dot((end == 0 ? hull.t0 : hull.t1)[k]);
+      reach_m /= static_cast<double>(hull.count);
+      if (reach_m > most_m) most_m = reach_m, best = item;
+    }
+    return best;
+  }
+
+  /// Of things that face each other the nearest two tell a direction that is wrong for what is beside them. As far as
+  /// one can be right for all, it is that in which their hulls are furthest apart, at either end of the step. A few
+  /// corners tell it by their nearest points: those that reach furthest along the direction before.
+  template <class A, class B, class Meet>
+  void findPlane(const A& a, const B& b, const Meet& meet) {
+    Turning plane{Vec3::Zero(), Vec3::Zero()};
+    plane_ = 0;
+    for (int end = 1; end >= (goal_.at_end ? 1 : 0); --end) {
+      const std::size_t which = end == 0 ? Reach::START : Reach::END;
+      pair_.set(a.itemHull(found_.item[0]), b.itemHull(found_.item[1]));
+      Nearest nearest = pair_.at(end, goal_.tolerance_m / 4);
+      std::array<MovingHull, 2> few;
+      for (int side = 0; side < 2; ++side) {
+        const Vec3 point = pair_.pointInMetres(nearest.point[side]);
+        few[side].t0.fill(point);
+        few[side].t1.fill(point);
+        few[side].count = 8;
+      }
+      double& most_m = apart_m_[end];
+      most_m = -std::numeric_limits<double>::infinity();
+      for (std::size_t round = 0; round < MOST_PLANES; ++round) {
+        const Vec3& n = nearest.direction;
+        if (n == Vec3::Zero() || isLate()) return;
+        const Furthest on_a = furthest(a, {-n, -n}, which), on_b = furthest(b, {n, n}, which);
+        const double apart_m = -on_a.reach_m - on_b.reach_m;
+        if (apart_m > most_m) most_m = apart_m, plane[end] = n;
+        if (most_m - slack_m_ >= enough_m_) break;
+        compare(a, b, {0, 0, facing(a, on_a.leaf, -n, end), facing(b, on_b.leaf, n, end), true}, meet);
+        if (!(enough_m_ > 0)) return;
+        for (int side = 0; side < 2; ++side) {
+          const VertexMotion& corner = (side == 0 ? on_a : on_b).corner;
+          const double* p = end == 0 ? corner.t0 : corner.t1;
+          few[side].t0[round % 8] = few[side].t1[round % 8] = Vec3(p[0], p[1], p[2]);
+        }
+        pair_.set(few[0], few[1]);
+        nearest = pair_.at(1, goal_.tolerance_m / 4);
+        if (pair_.upperInMetres(nearest.upper) - most_m < goal_.tolerance_m / 8) break;
+      }
+    }
+    if (goal_.at_end) plane[0] = plane[1];
+    if (!TurningAxes::areNear(plane)) return;
+    axes_ = TurningAxes(plane);
+    plane_ = ++planes_;
+    checked_from_ = number_;
+  }
+
+  /// Whether the plane shows that nothing is nearer.
+  template <class A, class B>
+  bool prunesAll(const A& a, const B& b) {
+    const Turning& n = axes_.axis[0];
+    if (plane_ == 0 || !(enough_m_ > 0)) return false;
+    double apart_m = goal_.at_end ? apart_m_[1] : std::min(apart_m_[0], apart_m_[1]);
+    if (apart_m - slack_m_ < enough_m_) return false;
+    if (!goal_.at_end) {
+      const Turning against{-n[0], -n[1]};
+      apart_m = std::min(apart_m, -furthest(a, against, Reach::MIDDLE).reach_m - furthest(b, n, Reach::MIDDLE).reach_m);
+    }
+    if (apart_m - slack_m_ < enough_m_) return false;
+    settle(apart_m - slack_m_);
+    return true;
   }
 
   /// Two items that are probably near: from each node to the child whose box is nearest.
@@ -247,7 +461,13 @@ class NearestSearch {
     pair_.set(a.itemHull(pair.a), b.itemHull(pair.b));
     item_ = {pair.a, pair.b};
     if (!goal_.at_end) return refine();
-    const double lower = enough_m_ > 0 ? takeAt(1).lower : 0;  // else nothing but whether they meet is open
+    double lower = 0;
+    if (enough_m_ > 0) {  // else nothing but whether they meet is open
+      const double upper_m = found_.upper_m;
+      const Nearest nearest = takeAt(1);
+      lower = nearest.lower;
+      if (found_.upper_m < upper_m) setDirection({nearest.direction, nearest.direction});
+    }
     if (lower > 0 || !meet(pair.a, pair.b)) {
       settle(pair_.lowerInMetres(lower));
     } else {
@@ -269,21 +489,28 @@ class NearestSearch {
   void settle(double lower_m) { found_.lower_m = std::min(found_.lower_m, lower_m); }
   bool isLate();
   Nearest takeAt(double t);
+  void setDirection(const Turning& direction);
   void takeMeeting();
   void refine();
 
   Goal goal_;
   FoundDistance found_;
-  Vec3 direction_ = Vec3::Zero();     // from the second to the first, of the nearest two so far
-  std::uint32_t direction_from_ = 0;  // the number of the first pair after it was set; 0: none is
-  std::uint64_t directions_ = 0;      // so many there were, in all searches
-  double slack_m_ = 0;                // of what is computed along it
-  std::array<std::vector<Reach>, 2> reach_;
+  bool has_direction_ = false;
+  Turning direction_;             // from the second to the first, of the nearest two so far
+  std::uint64_t directions_ = 0;  // so many there were, in all searches
+  std::array<std::vector<KnownReach>, 2> reach_;
+  std::uint64_t plane_ = 0, planes_ = 0;  // its number, of so many in all searches; 0: none is known
+  std::array<double, 2> apart_m_{};       // by it, at either end of the step
+  TurningAxes axes_;                      // the first one is across it
+  std::array<std::vector<KnownBox>, 2> turned_;
+  std::uint32_t checked_from_ = 0;  // the number of the first pair after direction or plane was set; 0: neither is
+  double slack_m_ = 0;              // of what is computed along them
   double enough_m_ = 0, enough_squared_ = 0;
   double settled_squared_ = 0;  // of all that was not looked into
   std::uint64_t looks_ = 0;
   std::uint32_t number_ = 0;
   std::vector<Pair> touching_, heap_;
+  std::vector<std::pair<double, std::uint32_t>> open_;  // nodes, and how far they reach
   HullPair pair_;
   std::array<std::uint32_t, 2> item_{};
 };

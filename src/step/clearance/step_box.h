@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +12,42 @@
 #include "dccd/types.h"
 
 namespace dccd {
+
+/// A direction that turns with the step: from the first of two unit vectors to the second, by way of their means.
+using Turning = std::array<Vec3, 2>;
+
+/// How far something that moves straight reaches along a turning direction n. Of a vertex p that is n.p, which is
+/// quadratic in the time and a mean of its three Bernstein coefficients: these are the most of each.
+struct Reach {
+  enum : std::size_t { START, MIDDLE, END, COUNT };
+  std::array<double, COUNT> most;
+
+  static Reach none() {
+    constexpr double NOWHERE = -std::numeric_limits<double>::infinity();
+    return {{NOWHERE, NOWHERE, NOWHERE}};
+  }
+  static double of(const VertexMotion& vertex, const Turning& along, std::size_t which) {
+    const auto dot = [](const Vec3& n, const double* p) { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2]; };
+    return which == START ? dot(along[0], vertex.t0)
+           : which == END ? dot(along[1], vertex.t1)
+                          : (dot(along[0], vertex.t1) + dot(along[1], vertex.t0)) / 2;
+  }
+  void add(const VertexMotion& vertex, const Turning& along) {
+    for (std::size_t which = 0; which < COUNT; ++which) most[which] = std::max(most[which], of(vertex, along, which));
+  }
+  void add(const Reach& other) {
+    for (std::size_t which = 0; which < COUNT; ++which) most[which] = std::max(most[which], other.most[which]);
+  }
+};
+
+/// What two are apart at least, in the step or at its end alone, by their reaches along a turning direction and against
+/// it. That is no longer than 1 on its way, so that it shortens no distance.
+inline double apartBy(const Reach& a, const Reach& b, bool at_end) {
+  double apart = -a.most[Reach::END] - b.most[Reach::END];
+  for (std::size_t which = 0; which < Reach::END && !at_end; ++which)
+    apart = std::min(apart, -a.most[which] - b.most[which]);
+  return apart;
+}
 
 /// In the layout of VertexMotion: x, y, z and 0 at t0, then at t1.
 struct StepBox {
@@ -34,18 +71,18 @@ struct StepBox {
     return box;
   }
   void add(const VertexMotion& vertex) {
-    for (int k = 0; k < 4; ++k) {
-      lo[k] = std::min(lo[k], vertex.t0[k]);
-      hi[k] = std::max(hi[k], vertex.t0[k]);
-      lo[4 + k] = std::min(lo[4 + k], vertex.t1[k]);
-      hi[4 + k] = std::max(hi[4 + k], vertex.t1[k]);
+    for (int end = 0; end < 2; ++end) {
+      const Eigen::Map<const Eigen::Array4d> at(end == 0 ? vertex.t0 : vertex.t1);
+      Eigen::Map<Eigen::Array4d> least(lo + 4 * end), most(hi + 4 * end);
+      least = least.min(at);
+      most = most.max(at);
     }
   }
   void add(const StepBox& other) {
-    for (int k = 0; k < 8; ++k) {
-      lo[k] = std::min(lo[k], other.lo[k]);
-      hi[k] = std::max(hi[k], other.hi[k]);
-    }
+    using Eight = Eigen::Array<double, 8, 1>;
+    Eigen::Map<Eight> least(lo), most(hi);
+    least = least.min(Eigen::Map<const Eight>(other.lo));
+    most = most.max(Eigen::Map<const Eight>(other.hi));
   }
   /// The largest coordinate, whatever its sign.
   double largest() const {
@@ -53,18 +90,22 @@ struct StepBox {
     for (int k = 0; k < 8; ++k) largest = std::max({largest, std::abs(lo[k]), std::abs(hi[k])});
     return largest;
   }
-  /// How far its corners reach along a direction in the step, or at its end alone.
-  double reach(const Vec3& direction, bool at_end) const {
-    double reach[2] = {0, 0};
-    for (int k = 0; k < 8; ++k) {
-      if (k % 4 < 3) reach[k / 4] += direction[k % 4] * (direction[k % 4] > 0 ? hi[k] : lo[k]);
-    }
-    return at_end ? reach[1] : std::max(reach[0], reach[1]);
+  Reach reach(const Turning& along) const {
+    return {{reach(along, Reach::START), reach(along, Reach::MIDDLE), reach(along, Reach::END)}};
   }
-  /// Of its way through the step, or at its end alone.
-  Vec3 middle(bool at_end) const {
-    const Vec3 end(lo[4] + hi[4], lo[5] + hi[5], lo[6] + hi[6]);
-    return at_end ? Vec3(end / 2) : Vec3((end + Vec3(lo[0] + hi[0], lo[1] + hi[1], lo[2] + hi[2])) / 4);
+  double reach(const Turning& along, std::size_t which) const {
+    const auto at = [&](int end, const Vec3& n) {
+      double sum = 0;
+      for (int k = 0; k < 3; ++k) sum += n[k] * (n[k] > 0 ? hi : lo)[4 * end + k];
+      return sum;
+    };
+    return which == Reach::START ? at(0, along[0])
+           : which == Reach::END ? at(1, along[1])
+                                 : (at(1, along[0]) + at(0, along[1])) / 2;
+  }
+  Vec3 middle(int end) const {
+    const int k = 4 * end;
+    return Vec3(lo[k] + hi[k], lo[k + 1] + hi[k + 1], lo[k + 2] + hi[k + 2]) / 2;
   }
   double length() const { return std::max({hi[4] - lo[4], hi[5] - lo[5], hi[6] - lo[6]}); }
 };

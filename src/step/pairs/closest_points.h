@@ -1,4 +1,5 @@
-// Closest points of segments and triangles in plain double: for display and control, nothing is decided with them.
+// Closest points of segments and triangles in plain double, for display and control. Decided with them is only what is
+// left out of a separation: wherever the points lie, the features are no farther apart.
 #pragma once
 
 #include <algorithm>

@@ -55,7 +55,6 @@ void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays&
   context.elementary = part.prepared.elementary.get();
   context.earliest_only = options.earliest_only;
   context.bounds_late = options.earliest_only && !until_first;
-  context.left_out = &part.prepared.left_out.of_body;
   context.deadline = part.deadline;
   context.per_hit = part.per_hit;
   if (holdsDistance(options.accuracy.rung)) context.tolerance_m = options.accuracy.tolerance_m;
@@ -70,16 +69,6 @@ void PairSearch::run(const Part& part, const SelfTests& self_tests, SceneArrays&
   for (const Searched& one : searched_) {
     if (one.listed && one.done == one.superclusters) looked.at(one.kind, one.body_a, one.body_b);
   }
-}
-
-void PairSearch::runSelf(const Prepared& prepared, const std::vector<std::size_t>& bodies, StepContext& context,
-                         Findings& result) {
-  const Search search{prepared, context, foundLimit(*prepared.options, context.scene->bodies()), result};
-  tasks_.clear();
-  group_pairs_.clear();
-  searched_.clear();
-  for (const std::size_t b : bodies) addSelfTasks(search, b);
-  runTasks(search);
 }
 
 /// A share of the pairs that is looked for after another one is the same searches', in the same order.

@@ -29,9 +29,6 @@ class PairSearch {
   /// its bounds may end before the step. result: of the pairs, what is left out and counted; collect() has the rest.
   /// looked: of which pairs of bodies all was looked at.
   void run(const Part& part, const SelfTests& self_tests, SceneArrays& shortened, Looked& looked, Findings& result);
-  /// Pairs of these bodies with themselves, in a context of the caller's.
-  void runSelf(const Prepared& prepared, const std::vector<std::size_t>& bodies, StepContext& context,
-               Findings& result);
   /// The contacts found, in canonical order, and what the workers counted (contacts.cpp). What is undecided when the
   /// deadline is over may be new: nothing is computed for it any more.
   void collect(const Part& part, Findings& result);

@@ -20,8 +20,6 @@ constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
 constexpr std::chrono::microseconds TIME_FOR_BOUNDS(100);
 constexpr std::size_t BOUNDS_PER_LOOK_AT_THE_CLOCK = 64, BOUNDS_IN_ANY_CASE = 1024;
 
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
-
 }  // namespace
 
 PairWorker::PairWorker()
@@ -38,6 +36,7 @@ void PairWorker::beginStep() {
     h.clear();
   }
   stats_ = StepStats();
+  unsure_.clear();
   bounds_ = 0;
   late_ = false;
   unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
@@ -64,9 +63,7 @@ void PairWorker::begin(StepContext& context, const PairTask& task, std::size_t i
   b_ = &context.scene->bodies()[task.body_b];
   rule_ = SeparationRule(*context.scene, task.body_a, task.body_b, context.tolerance_m);
   separated_ = rule_.applies();
-  left_out_ = task.self && separated_ && context.left_out && !(*context.left_out)[task.body_a].empty()
-                  ? &(*context.left_out)[task.body_a]
-                  : nullptr;
+  unsure_.resize(context.scene->bodies().size(), 0);
   count_ = 0;
   separated_ms_ = 0;
   begun_ = lap_begun_ = Clock::now();
@@ -174,7 +171,10 @@ void PairWorker::flush() {
   const Clock::time_point start = lap_begun_;
   filter();
   makeCanonical();
-  if (separated_) setSeparations();
+  if (separated_) {
+    setSeparations();
+    lookAtUnsure();
+  }
   const std::vector<Hit>& hits = hits_[static_cast<int>(task_->kind)];
   const std::size_t before = hits.size();
   // Which pairs are late depends on which were looked at first: no pair is left out where they are counted.
@@ -243,13 +243,37 @@ void PairWorker::makeCanonical() {
 
 void PairWorker::setSeparations() {
   for (std::size_t i = 0; i < count_; ++i) {
-    const double apart_m = left_out_ ? left_out_->distance(task_->kind, keys_[i]) : INFINITE;
-    const PairSeparation pair = rule_.of(task_->kind, quads_[i], apart_m);
+    const PairSeparation pair = rule_.of(task_->kind, quads_[i]);
     separations_[i] = pair.total_m;
-    stats_.left_out_met += pair.left_out;
+    stats_.left_out_met += pair.left_out || pair.unsure_m > 0;
+    if (pair.unsure_m > 0) {
+      unsure_pairs_.push_back(quads_[i]);
+      unsure_m_.push_back(pair.unsure_m);
+    }
     --stats_[effect()].in;
     ++stats_[effectOf(pair.total_m, pair.noise_m)].in;
   }
+}
+
+/// One that comes as near as it may be off is enough.
+void PairWorker::lookAtUnsure() {
+  if (!unsure_[task_->body_a] && !unsure_pairs_.empty()) {
+    PairBatch batch;
+    batch.kind = task_->kind;
+    batch.vertices = context_->scene->vertices();
+    batch.pairs = unsure_pairs_.data();
+    batch.count = unsure_pairs_.size();
+    batch.minimum_separation_m = unsure_m_.data();
+    const Deadline deadline = context_->pairsDeadline();
+    if (deadline.canEnd()) batch.deadline = &deadline;
+    TierCounters not_counted;
+    context_->elementary->run(batch, results_.data(), not_counted);
+    unsure_[task_->body_a] =
+        std::any_of(results_.begin(), results_.begin() + static_cast<std::ptrdiff_t>(batch.count),
+                    [](const ElementaryResult& result) { return result.verdict != Verdict::NO_CONTACT; });
+  }
+  unsure_pairs_.clear();
+  unsure_m_.clear();
 }
 
 void PairWorker::countOut(std::size_t i) {

@@ -10,7 +10,6 @@
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
 #include "step/pairs/found_limit.h"
-#include "step/pairs/left_out.h"
 #include "step/pairs/pair_separation.h"
 
 namespace dccd {
@@ -57,7 +56,6 @@ struct StepContext {
   Deadline deadline;
   std::atomic<bool> expired{false};
   bool earliest_only = false;
-  const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   FoundLimit* found = nullptr;            ///< null: no limit
@@ -99,6 +97,10 @@ class PairWorker {
   const std::vector<Hit>& hits(PairKind kind) const { return hits_[static_cast<int>(kind)]; }
   const StepStats& stats() const { return stats_; }
   double uncheckedTocLower() const { return unchecked_toc_lower_; }
+  /// Bodies of which neighbours came as near as their uncertainty reaches: whether these touch nobody can tell.
+  void markUnsure(std::vector<std::uint8_t>& bodies) const {
+    for (std::size_t b = 0; b < unsure_.size(); ++b) bodies[b] = bodies[b] || unsure_[b];
+  }
 
  private:
   void begin(StepContext& context, const PairTask& task, std::size_t index);
@@ -122,6 +124,7 @@ class PairWorker {
     return noise_m > 0 ? Effect::TRACKER_NOISE : separation_m > 0 ? Effect::MINIMUM_SEPARATION : effect();
   }
   void setSeparations();
+  void lookAtUnsure();
   double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
   void countOut(std::size_t i);
   void lap(Stage stage);
@@ -138,9 +141,11 @@ class PairWorker {
   std::vector<std::uint32_t> kept_;
   std::vector<ElementaryResult> results_;
   std::vector<double> separations_;
-  SeparationRule rule_;     // of the task's bodies
-  bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
-  const LeftOutOfBody* left_out_ = nullptr;
+  SeparationRule rule_;             // of the task's bodies
+  bool separated_ = false;          // the rule applies: separations_ holds a value for each pair
+  std::vector<Quad> unsure_pairs_;  // of the count_, those that PairSeparation::unsure_m is set of
+  std::vector<double> unsure_m_;
+  std::vector<std::uint8_t> unsure_;  // per body
   std::size_t count_ = 0;
   std::size_t bounds_ = 0;                         // that were asked for in this step
   bool late_ = false;                              // there is no time for more

@@ -24,9 +24,9 @@ bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t
   return scene.separation(b, b) == 0 && !body.uncertain && !body.masked;
 }
 
-void SelfTests::setBodies(const std::vector<SceneBody>& bodies) {
-  unfolded_.clear();
-  for (const SceneBody& body : bodies) unfolded_.emplace_back(body);
+void SelfTests::setBodies(const std::vector<SceneBody>& bodies, std::size_t held) {
+  while (unfolded_.size() > held) unfolded_.pop_back();
+  while (unfolded_.size() < bodies.size()) unfolded_.emplace_back(bodies[unfolded_.size()]);
 }
 
 void SelfTests::choose(const Part& part, const std::vector<std::uint8_t>& apart, Looked& looked, StepStats& stats) {

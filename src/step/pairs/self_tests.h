@@ -18,7 +18,7 @@ bool mayBeUnfolded(const Options& options, const SceneArrays& scene, std::size_t
 
 class SelfTests {
  public:
-  void setBodies(const std::vector<SceneBody>& bodies);
+  void setBodies(const std::vector<SceneBody>& bodies, std::size_t held);  ///< held: the first ones, as they were
   /// apart: Carried::apart. looked: what needs no test.
   void choose(const Part& part, const std::vector<std::uint8_t>& apart, Looked& looked, StepStats& stats);
 

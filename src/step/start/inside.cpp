@@ -66,7 +66,7 @@ bool InsideSearch::isInside(const SceneArrays& scene, const Question& question) 
   const double* point = x(question.internal);
   bool touched = false, enclosed = false;
   visitAbove(faces, scene.record(question.internal), faces.height() - 1, 0, [&](std::size_t slot) {
-    if (touched || scene.bodies()[question.closed].isRepeated(slot)) return;
+    if (touched || scene.bodies()[question.closed].enclosesNothing(slot)) return;
     const Index* f = faces.feature(slot);
     const Sight sight = sightOf(point, x(f[0]), x(f[1]), x(f[2]));
     touched = sight == Sight::TOUCHED;
@@ -80,7 +80,7 @@ const std::vector<StartIntersection>& InsideSearch::run(const SceneArrays& scene
   asked_ = 0;
   // With vertices left out the pieces are others: such a step is asked anew, and so is the next.
   const bool all_finite = stats.unchecked_vertices == 0;
-  if (!(all_finite && pieces_of_all_)) forgetBodies();
+  if (!(all_finite && pieces_of_all_)) keepBodies(0);
   pieces_of_all_ = all_finite;
   const bool same_surfaces = takeSurfaces(scene);
   if (!(continues && known_ && all_finite && same_surfaces)) clear();

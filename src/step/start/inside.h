@@ -57,8 +57,8 @@ class InsideSearch {
   /// Nothing is known of a step before: the next run() asks about all pairs.
   void clear();
   bool isClear() const { return !known_ && !searched_ && inside_.empty() && open_.empty(); }
-  /// The bodies change: what was learnt of their meshes is forgotten.
-  void forgetBodies() { pieces_.clear(); }
+  /// The bodies change but for the first ones: what was learnt of their meshes is forgotten.
+  void keepBodies(std::size_t count) { pieces_.resize(std::min(pieces_.size(), count)); }
 
  private:
   /// Is the vertex of `body` in the solid of `closed`?

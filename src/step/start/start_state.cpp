@@ -429,10 +429,11 @@ void StartStateSearch::addFacesAtEdge(const SceneArrays& scene, std::uint32_t ed
 }
 
 void StartStateSearch::learnNeighbourhoods(const SceneArrays& scene) {
-  if (!neighbourhoods_.empty()) return;
-  std::vector<Neighbourhood> learnt(scene.bodies().size());
-  for (std::size_t b = 0; b < learnt.size(); ++b) learnt[b].learn(scene, b);
-  neighbourhoods_ = std::move(learnt);
+  for (std::size_t b = neighbourhoods_.size(); b < scene.bodies().size(); ++b) {
+    Neighbourhood learnt;
+    learnt.learn(scene, b);
+    neighbourhoods_.push_back(std::move(learnt));
+  }
 }
 
 void StartStateSearch::clear() {

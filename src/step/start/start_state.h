@@ -96,8 +96,8 @@ class StartStateSearch {
   /// Nothing is known of a step before: the next run() is a full test.
   void clear();
   bool isClear() const { return !known_ && !searched_ && found_.empty() && candidates_.empty() && touched_.empty(); }
-  /// The bodies change: what was learnt of their meshes is forgotten.
-  void forgetBodies() { neighbourhoods_.clear(); }
+  /// The bodies change but for the first ones: what was learnt of their meshes is forgotten.
+  void keepBodies(std::size_t count) { neighbourhoods_.resize(std::min(neighbourhoods_.size(), count)); }
 
  private:
   /// The features of a contact: what crosses after it lies around them.

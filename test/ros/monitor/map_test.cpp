@@ -1,4 +1,4 @@
-// The live node with a grid over an octomap: a map that is missing, and both kinds of message.
+// The live node with a grid over an octomap, of both kinds of message.
 #include <deformable_ccd/ContactArray.h>
 
 #include <algorithm>
@@ -30,15 +30,6 @@ struct Grid : MonitorTest {
     }));
   }
 };
-
-TEST_F(Grid, AMissingMapIsNoAnswerAboutIt) {
-  // The first case of this monitor, before it has had any map.
-  send(mesh, cloud(gridAt(3, 4, 0.3), 10));
-  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.2), 10.1));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP);
-  EXPECT_TRUE(outcome.answered) << "about the mesh alone";
-  EXPECT_FALSE(clear.last().data);
-}
 
 TEST_F(Grid, OctomapBinaryAndFull) {
   for (const bool binary : {true, false}) {

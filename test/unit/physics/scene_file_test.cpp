@@ -76,17 +76,6 @@ TEST(SceneFile, WhatIsWrongIsNamedWithItsLineAndWhatToWrite) {
       "this line");
 }
 
-TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
-  expectTold("bodies:",
-             "monitor:\n  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: "
-             "4}}\nbodies:",
-             "accepted");
-  expectTold(
-      "bodies:", "monitor:\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\nbodies:",
-      "s.yaml:8: monitor/bodies/cloth/topology/rows and cols are 4 x 4 = 16, but sheet has 12 points; write rows: "
-      "3, cols: 4");
-}
-
 TEST(SceneFile, ACameraIsReadStrictly) {
   const std::string text = std::string(GOOD) +
                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"

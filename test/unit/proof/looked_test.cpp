@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "dccd/assurance.h"
@@ -75,40 +77,129 @@ TEST(Looked, WhatIsLeftOutByChoiceIsNoGap) {
   EXPECT_TRUE(looked.gaps(bodies, true, false).empty());
 }
 
-TEST(Claim, HoldsOnceEachPartWithoutAGapFollowsTheOneBefore) {
+constexpr auto COUNT = static_cast<std::size_t>(Question::COUNT);
+
+/// Of two bodies; all but one answer are given. which: by question and body, the latter 0 where it is none of a body.
+Claim claimWithout(std::pair<std::size_t, std::size_t> which, bool of_cell) {
   Claim claim;
-  EXPECT_FALSE(claim.holds());
-  claim.add(0, 3, {});
+  claim.ask(2);
+  if (of_cell) claim.askOfCell();
+  claim.add(0, 1, {});
+  for (std::size_t q = 0; q < COUNT; ++q) {
+    for (std::size_t b = 0; b < 2; ++b) {
+      if (std::make_pair(q, b) != which) claim.answer(static_cast<Question>(q), "", b);
+    }
+  }
+  return claim;
+}
+
+TEST(Claim, EachAnswerThatIsMissingTakesItAway) {
+  const std::size_t none = COUNT;
+  EXPECT_TRUE(claimWithout({none, 0}, true).holds());
+  std::vector<Body> bodies(2);
+  bodies[0].name = "cloth";
+  bodies[1].name = "finger";
+  std::size_t of_bodies = 0, of_cells = 0;
+  for (std::size_t q = 0; q < COUNT; ++q) {
+    // What is not of a body is answered by either call of the loop: leave out both.
+    Claim neither;
+    neither.ask(2);
+    neither.askOfCell();
+    neither.add(0, 1, {});
+    for (std::size_t other = 0; other < COUNT; ++other) {
+      for (std::size_t b = 0; other != q && b < 2; ++b) neither.answer(static_cast<Question>(other), "", b);
+    }
+    EXPECT_FALSE(neither.holds()) << q;
+    EXPECT_FALSE(neither.holdsButForTime()) << q;
+    for (const std::string& sentence : neither.missing(bodies)) EXPECT_EQ(sentence.rfind("nobody looked ", 0), 0u);
+    const bool is_of_body = neither.missing(bodies).size() == 2;
+    of_bodies += is_of_body;
+    for (std::size_t b = 0; b < 2; ++b) {
+      const Claim claim = claimWithout({q, b}, true);
+      EXPECT_EQ(claim.holds(), !is_of_body) << q;
+      if (is_of_body) EXPECT_TRUE(mentions(claim.missing(bodies).at(0), "'" + bodies[b].name + "'"));
+    }
+    // Of a step that nobody made of messages less is asked.
+    Claim by_hand = claimWithout({none, 0}, false);
+    EXPECT_TRUE(by_hand.holds());
+    Claim alone;
+    alone.ask(0);
+    alone.add(0, 1, {});
+    for (std::size_t other = 0; other < COUNT; ++other) {
+      if (other != q) alone.answer(static_cast<Question>(other), "");
+    }
+    of_cells += alone.holds() && !is_of_body;
+  }
+  EXPECT_EQ(of_bodies, 5u);
+  EXPECT_EQ(of_cells, 9u);
+}
+
+TEST(Claim, OneAnswerThatIsNoTakesItAway) {
+  for (std::size_t q = 0; q < COUNT; ++q) {
+    Claim claim = claimWithout({COUNT, 0}, true);
+    claim.answer(static_cast<Question>(q), "it is not", 1);
+    claim.answer(static_cast<Question>(q), "", 1);
+    EXPECT_FALSE(claim.holds());
+    EXPECT_EQ(claim.holdsButForTime(), static_cast<Question>(q) == Question::TIME);
+    EXPECT_EQ(claim.missing({}), std::vector<std::string>{"it is not"});
+  }
+}
+
+TEST(Claim, HoldsOnceEachPartWithoutAGapFollowsTheOneBefore) {
+  const auto begun = [] {
+    Claim claim = claimWithout({COUNT, 0}, false);
+    claim.add(0, 3, {});
+    return claim;
+  };
+  Claim claim = begun();
   claim.add(1, 3, {});
   EXPECT_FALSE(claim.holds());
-  EXPECT_TRUE(mentions(claim.inWords({}).at(0), "nobody looked at all of the step"));
+  EXPECT_TRUE(mentions(claim.missing({}).at(0), "nobody looked at all of the step"));
   claim.add(2, 3, {});
   EXPECT_TRUE(claim.holds());
+  EXPECT_TRUE(claim.missing({}).empty());
 
-  Claim skipped;
-  skipped.add(0, 3, {});
+  Claim skipped = begun();
   skipped.add(2, 3, {});
   EXPECT_FALSE(skipped.holds());
 
-  Claim gap;
+  Claim gap = claimWithout({COUNT, 0}, false);
   gap.add(0, 2, {});
   gap.add(1, 2, {Gap{{0, OBSTACLE_BODY}}, Gap{{1, 1}}, Gap{{0, 0}, true}});
   EXPECT_FALSE(gap.holds());
-  const std::vector<std::string> said = gap.inWords({"cloth", "finger"});
+  std::vector<Body> bodies(2);
+  bodies[0].name = "cloth";
+  bodies[1].name = "finger";
+  const std::vector<std::string> said = gap.missing(bodies);
   ASSERT_EQ(said.size(), 3u);
   EXPECT_EQ(said[0], "nobody looked whether 'cloth' touches the map from 0.5 to 1 of the step");
   EXPECT_EQ(said[1], "nobody looked whether 'finger' touches itself from 0.5 to 1 of the step");
   EXPECT_EQ(said[2], "nobody looked whether surfaces cross at 0.5 of the step");
+  gap.answer(Question::TIME, "it ran out");
+  EXPECT_EQ(gap.missing(bodies), std::vector<std::string>{"it ran out"}) << "which tells of the gaps";
+  EXPECT_TRUE(gap.holdsButForTime());
 }
 
 TEST(Claim, WithoutOneNoAnswerIsProved) {
+  EXPECT_FALSE(Claim().holds());
+  EXPECT_FALSE(Claim().missing({}).empty());
   Outcome outcome = TwoSheets(0.3, 0.05).answer();
   EXPECT_TRUE(outcome.claim.holds());
   EXPECT_TRUE(assuranceOf(outcome).clear());
+  Outcome of_cell = outcome;
+  of_cell.claim.askOfCell();
+  EXPECT_FALSE(assuranceOf(of_cell).proved) << "nobody answers for what came";
   outcome.claim = Claim();
   EXPECT_FALSE(assuranceOf(outcome).proved);
   ASSERT_EQ(assuranceOf(outcome).missing.size(), 1u);
   EXPECT_TRUE(mentions(assuranceOf(outcome).missing[0], "nobody looked"));
+}
+
+TEST(Claim, OfARecordingIsWhatWasSaid) {
+  EXPECT_TRUE(Claim::thatWasSaid({}).holds());
+  const Claim two = Claim::thatWasSaid({"this", "that"});
+  EXPECT_FALSE(two.holds());
+  EXPECT_EQ(two.missing({}), (std::vector<std::string>{"this", "that"}));
 }
 
 /// What spares a search says itself that it does.
@@ -119,7 +210,7 @@ struct Spared : testing::Test {
   Outcome run() {
     const Outcome outcome = detect(sheets.step, sheets.options, history);
     EXPECT_TRUE(outcome.complete);
-    EXPECT_TRUE(outcome.claim.holds()) << outcome.claim.inWords({"upper", "lower"}).at(0);
+    EXPECT_TRUE(outcome.claim.holds()) << outcome.missing().at(0);
     return outcome;
   }
   /// The upper one is moved on as it is.

@@ -40,7 +40,7 @@ TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
   ASSERT_EQ(r.step.bodies[0].radius_m->size(), 20u);
   EXPECT_EQ((*r.step.bodies[0].radius_m)[7], 3e-3);
   ASSERT_TRUE(r.step.bodies[0].reference) << "its first frame";
-  EXPECT_NE(r.step.bodies[0].reference->positions, *r.step.bodies[0].t0);
+  EXPECT_NE(*r.step.bodies[0].reference, *r.step.bodies[0].t0);
   ASSERT_EQ(r.step.bodies[2].separations.size(), 1u);
   EXPECT_EQ(r.step.bodies[2].separations[0].separation_m, 0.15);
   EXPECT_GT(r.answer.contacts.size(), without.answer.contacts.size());
@@ -58,9 +58,9 @@ TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
   EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[2].separations.clear(); }));
   EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[0].not_against = {2}; }));
   EXPECT_TRUE(differs([](StepRecording& c) {
-    ReferenceFrame spread = *c.step.bodies[0].reference;
-    for (Vec3& p : spread.positions) p *= 10;  // nothing is close in it, so nothing is left out
-    c.step.bodies[0].reference = std::make_shared<const ReferenceFrame>(spread);
+    Positions spread = *c.step.bodies[0].reference;
+    for (Vec3& p : spread) p *= 10;  // nothing is close in it, so nothing is left out
+    c.step.bodies[0].reference = share(spread);
   }));
 }
 

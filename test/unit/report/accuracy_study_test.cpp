@@ -4,9 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
-#include <fstream>
-#include <sstream>
 
 namespace dccd {
 namespace {
@@ -243,27 +240,6 @@ TEST(AccuracyStudy, TheSentenceIsOfTheFastestThatLosesNothing) {
   EXPECT_EQ(AccuracyStudy(run()).sentence(),
             "Nothing touches in this recording: there is no first contact to compare.");
   EXPECT_EQ(AccuracyStudy(RunRecord()).sentence(), "No step was answered: there is nothing to compare.");
-}
-
-TEST(AccuracyStudy, ATableHasARowARun) {
-  AccuracyStudy study(run({patch(110, 300, 0)}));
-  study.add("reference", "exact", study.reference());
-  study.add("frames", "every 2nd", run());
-  const std::string path = ::testing::TempDir() + "accuracy_study.csv";
-  study.write(path);
-  std::ifstream in(path);
-  std::ostringstream text;
-  text << in.rdbuf();
-  std::remove(path.c_str());
-  EXPECT_EQ(text.str(),
-            "varied,setting,steps,ms_per_s,patches_touched,patches_missed,patches_invented,patches_median_ms,"
-            "patches_p95_ms,patches_early_ms,patches_late_ms,patches_joined,patches_parted,vertices_touched,"
-            "vertices_missed,vertices_invented,vertices_median_ms,vertices_p95_ms,vertices_early_ms,vertices_late_ms,"
-            "pairs_share,cut_steps,bound\n"
-            "reference,exact,10,2,1,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0,0\n"
-            "frames,every 2nd,10,2,1,1,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0,0\n");
-  EXPECT_EQ(study.json().at("rows").size(), 2u);
-  EXPECT_THROW(study.write("/nowhere/study.csv"), std::runtime_error);
 }
 
 }  // namespace

@@ -13,18 +13,18 @@ namespace {
 Outcome nothingFound(StepStatus status, StartState start) {
   Outcome outcome;
   outcome.answered = true;
-  outcome.claim.add(0, 1, {});
   outcome.status = status;
   outcome.start_state = start;
-  if (status != StepStatus::OK) outcome.unproved.push_back(toString(status));
+  outcome.claim = Claim::thatWasSaid({});
+  if (status != StepStatus::OK) outcome.claim.answer(Question::CONTENTS, toString(status));
   if (start == StartState::INTERSECTING) outcome.touching = Touching::LASTING;
   return outcome;
 }
 
-std::string headlineOf(const std::vector<Outcome>& outcomes) {
+std::string headlineOf(const std::vector<Outcome>& outcomes, const std::vector<Body>& bodies = {}) {
   const std::string folder = ::testing::TempDir() + "headline_report";
   Report report(folder);
-  for (const Outcome& outcome : outcomes) report.add(outcome, {});
+  for (const Outcome& outcome : outcomes) report.add(outcome, bodies);
   const std::string headline = report.headline();
   std::filesystem::remove_all(folder);
   return headline;
@@ -56,9 +56,44 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
             "No contact found in 2 answered steps; not proved: 1 of 4 frames: NO_TRANSFORM: no transform from 'camera' "
             "to 'world' (1).");
   Outcome doubtful = clear;
-  doubtful.unproved = {"1 vertex is not finite", "and more"};
+  doubtful.claim = Claim::thatWasSaid({"1 vertex is not finite", "and more"});
   EXPECT_EQ(headlineOf({doubtful}),
             "No contact found in 1 answered step; not proved: 1 of 1 frame: 1 vertex is not finite (1).");
+}
+
+TEST(Headline, ADoubtStandsBesideTheProof) {
+  const std::string folder = ::testing::TempDir() + "report_in_doubt";
+  Report report(folder);
+  report.add(nothingFound(StepStatus::OK, StartState::CLEAR), {});
+  report.setDoubts({"body 'rope': the mesh is 600 m across; are these millimetres?"});
+  EXPECT_EQ(report.headline(),
+            "No contact in 1 answered step; all of it proved; in doubt: body 'rope': the mesh is 600 m across; are "
+            "these millimetres?.");
+  report.finish();
+  const auto proof = nlohmann::json::parse(std::ifstream(folder + "/report.json"))["proof"];
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(proof["doubts"], nlohmann::json::array({"body 'rope': the mesh is 600 m across; are these millimetres?"}));
+}
+
+// No contact tells of it, and an STL in millimetres is the common cause.
+TEST(Headline, WhatLiesInsideOfWhatIsNamed) {
+  const auto step = std::make_shared<Step>();
+  step->bodies.resize(2);
+  step->bodies[0].name = "rope";
+  step->bodies[1].name = "box";
+  step->bodies[1].rigid = true;
+  step->bodies[1].t0 = share(Positions{{0, 0, 0}, {400, 1, 1}});
+  Outcome inside = nothingFound(StepStatus::OK, StartState::INTERSECTING);
+  inside.step = step;
+  inside.intersections.resize(2);
+  inside.intersections[0].body = {0, 1};
+  inside.intersections[0].vertex[0] = 3;
+  inside.intersections[1] = inside.intersections[0];
+  inside.intersections[1].vertex[0] = 4;
+  EXPECT_EQ(headlineOf({inside}),
+            "No contact found in 1 answered step; surfaces touched from the start of a step (rope lies inside of box, "
+            "which is 400 m across: rigid/scale: 0.001 if its file is in millimetres, shell: true if it is a container "
+            "1); all of it proved.");
 }
 
 TEST(Headline, WhatWasNotLookedAtStandsBesideWhatWasFound) {
@@ -77,6 +112,7 @@ TEST(Headline, WhatWasNotLookedAtStandsBesideWhatWasFound) {
   EXPECT_EQ(proof, nlohmann::json({{"steps", 1},
                                    {"proved", 0},
                                    {"unproved", "1 of 1 frame: NO_MAP (1)"},
+                                   {"doubts", nlohmann::json::array()},
                                    {"not_looked_at", {"nothing was checked against a map: the bag has none"}}}));
 }
 
@@ -88,12 +124,44 @@ TEST(Headline, ExpectedContactsAreToldApart) {
             "No unexpected contact in 2 answered steps; expected contacts in 1 of them; all of it proved.");
 }
 
-TEST(Headline, ContactsAreCountedInStepsWithAnUnexpectedOne) {
+std::shared_ptr<Step> stepOfACloth() {
   auto step = std::make_shared<Step>();
   step->bodies.resize(1);
   step->bodies[0].name = "cloth";
   step->bodies[0].topology = share(Topology::grid(2, 2));
   step->bodies[0].t0 = step->bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  return step;
+}
+
+// The terminal said 0.0000 s (initial), the page 0.240 s.
+TEST(Headline, TheFirstContactIsANewOneAsOnThePage) {
+  const auto step = stepOfACloth();
+  Outcome resting = nothingFound(StepStatus::OK, StartState::CLEAR);
+  resting.step = step;
+  resting.start_ns = 1000000000;
+  resting.stamp_ns = 1100000000;
+  resting.contacts.resize(1);
+  resting.contacts[0].vertex = {0, 1, 2, 3};
+  resting.contacts[0].initial = true;
+  resting.total_contacts = resting.counts.certain = resting.counts.initial = 1;
+  resting.touching = Touching::LASTING;
+  const std::string none = headlineOf({resting}, step->bodies);
+  EXPECT_EQ(none.rfind("No new contact; since before it was looked at cloth meets cloth (", 0), 0u) << none;
+  Outcome touching = resting;
+  touching.start_ns = 1100000000;
+  touching.stamp_ns = 1200000000;
+  touching.contacts.push_back(touching.contacts[0]);
+  touching.contacts[1].initial = false;
+  touching.contacts[1].vertex = {1, 0, 2, 3};
+  touching.contacts[1].toc_lower = touching.contacts[1].toc_upper = 0.5;
+  touching.touching = Touching::NEW;
+  const std::string headline = headlineOf({resting, touching}, step->bodies);
+  EXPECT_EQ(headline.rfind("First contact 0.1500 s after the start: cloth meets cloth (", 0), 0u) << headline;
+  EXPECT_NE(headline.find("vertices 1 0 2 3, certain)"), std::string::npos) << headline;
+}
+
+TEST(Headline, ContactsAreCountedInStepsWithAnUnexpectedOne) {
+  const auto step = stepOfACloth();
   Outcome touching = nothingFound(StepStatus::OK, StartState::CLEAR);
   touching.step = step;
   touching.contacts.resize(1);

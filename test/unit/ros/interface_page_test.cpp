@@ -103,7 +103,7 @@ Defaults defaultsInTheCode() {
       {"minimum_separation_m", shown(body.body.minimum_separation_m)},
       {"own_voxels_m", shown(body.body.own_voxels_m)},
       {"uncertainty/radius_m", shown(body.input.noise_radius_m)},
-      {"max_speed_m_s", body.speed.max_m_s == SpeedBound::NONE ? "0" : shown(body.speed.max_m_s)},
+      {"max_speed_m_s", body.speed.max_m_s == SpeedBound::NONE ? "`none`" : shown(body.speed.max_m_s)},
       {"max_acceleration_m_s2", shown(body.max_acceleration_m_s2)},
       {"slows_down", shown(body.speed.slows_down)},
       {"uncertainty/field", shown(body.input.noise_field)},
@@ -148,7 +148,7 @@ Defaults defaultsOnThePage(const std::string& from, const std::string& to) {
 }
 
 TEST(InterfacePage, DefaultsOfABodyAreTheCodes) {
-  EXPECT_EQ(defaultsOnThePage("\nPer body", "**A whole example"), defaultsInTheCode());
+  EXPECT_EQ(defaultsOnThePage("\nPer body", "### Time and memory"), defaultsInTheCode());
   XmlRpcValue rigid;
   rigid["bodies"]["cloth"]["topic"] = "cloth";
   rigid["bodies"]["pad"]["rigid"]["frame"] = "pad";
@@ -220,7 +220,7 @@ Defaults inForceOfTheNode() {
           {"robot/padding_m", plain(robot.padding_m)},
           {"robot/max_own_voxels", plain(robot.max_own_voxels)},
           {"robot/own_voxels_m", robot.own_voxels_m == ONE_VOXEL ? "auto" : plain(robot.own_voxels_m)},
-          {"max_speed_m_s", config.speed.max_m_s == SpeedBound::NONE ? "0" : plain(config.speed.max_m_s)},
+          {"max_speed_m_s", config.speed.max_m_s == SpeedBound::NONE ? "none" : plain(config.speed.max_m_s)},
           {"max_acceleration_m_s2", plain(config.max_acceleration_m_s2)},
           {"speed_scale/uncertainty_m", plain(SpeedLaw().uncertainty_m)},
           {"robot/speed_factor", plain(robot.speedOr(config.speed).last_step_factor)},
@@ -248,6 +248,9 @@ TEST(InterfacePage, DefaultsOfTheNodeAreThoseInForceWhereNoneIsGiven) {
                                       "exclude_boxes",
                                       "expected_contacts",
                                       "fixed_frame",
+                                      "intent/deviation_m",
+                                      "intent/deviation_rate_m_s",
+                                      "intent/horizon_s",
                                       "minimum_separation_pairs",
                                       "obstacle_box",
                                       "obstacle_cloud_topics",

@@ -474,6 +474,7 @@ TEST_F(MarkerGrammar, WhatCameBeforeAndIsShownStill) {
   anew();
   EXPECT_EQ(read(numbered(0)).unread_markers, 0u);
   EXPECT_EQ(read(numbered(1)).unread_markers, 1u) << "boards of a shelf, each sent once";
+  EXPECT_EQ(read(numbered(2)).unread_markers, 2u);
   config.marker_id = 1;
   anew();
   read(numbered(1));
@@ -641,7 +642,7 @@ TEST_F(RopeGrammar, Strips) {
   EXPECT_EQ(mesh.topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}}));
   EXPECT_EQ(mesh.positions[3], Vec3(2, 1, 2)) << "the pose moves it, the scale is how thick it is drawn";
   EXPECT_FALSE(mesh.topology->hasFaces());
-  EXPECT_EQ(read(strip({b, b, c, d})).topology, mesh.topology) << "the same rope in motion";
+  EXPECT_EQ(read(strip({e, b, c, d})).topology, mesh.topology) << "the same rope in motion";
   EXPECT_TRUE(mentions(refusalOf(strip({a})), "has 1 point, and a rope needs 2"));
   EXPECT_TRUE(mentions(refusalOf(strip({})), "('rope', 0, type 4 without points)"));
 }
@@ -649,10 +650,10 @@ TEST_F(RopeGrammar, Strips) {
 TEST_F(RopeGrammar, PointsThatRepeat) {
   const Edges by_one = {{0, 1}, {1, 4}, {4, 5}};
   const DecodedMesh mesh = read(strip({a, b, b, b, c, d}));
-  EXPECT_EQ(mesh.topology->edges(), by_one) << "three that are one; else those before and after touch there";
+  EXPECT_EQ(mesh.topology->edges(), by_one) << "equal ones are one; else those before and after touch there";
   EXPECT_EQ(mesh.positions.size(), 6u) << "each point of the message is a vertex";
   EXPECT_EQ(read(strip({a, c, c, c, d, e})).topology, mesh.topology) << "in motion";
-  EXPECT_EQ(read(strip({a, b, c, d, d, e})).topology->edges().size(), 5u) << "two are neighbours anyway";
+  EXPECT_EQ(read(strip({a, b, c, d, d, e})).topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}, {3, 5}})) << "two";
   EXPECT_EQ(read(strip({a, b, c, e, e, e, e})).topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}})) << "at the end";
   EXPECT_EQ(read(strip({a, a, a, b, c, a, a, a})).topology->edges(), (Edges{{0, 3}, {0, 4}, {3, 4}})) << "a loop";
   anew();
@@ -735,6 +736,23 @@ TEST_F(RopeGrammar, SeveralRopes) {
   far.header.frame_id = "camera";
   const std::string frames = refusalOf(all({strip({a, b}, 1), far}));
   EXPECT_TRUE(mentions(frames, "('rope', 2) is in frame 'camera', and ('rope', 1) in frame 'world'")) << frames;
+}
+
+TEST_F(RopeGrammar, StampsOfSeveralRopes) {
+  const auto stamped = [&](std::int32_t id, const Positions& points, double stamp_s) {
+    visualization_msgs::Marker one = strip(points, id);
+    one.header.stamp = ros::Time(stamp_s);
+    return one;
+  };
+  const auto pair = [&](double one_s, double other_s) {
+    return all({stamped(1, {a, b}, one_s), stamped(2, {d, e}, other_s)});
+  };
+  EXPECT_EQ(read(pair(5.0005, 5)).stamp_ns, 5'000'000'000) << "the earliest, wherever it stands";
+  EXPECT_EQ(read(pair(6, 6.001)).stamp_ns, 6'000'000'000);
+  const std::string late = refusalOf(pair(7, 7.0011));
+  EXPECT_TRUE(mentions(late, "('rope', 2) is stamped 0.001100 s after ('rope', 1)")) << late;
+  const std::string early = refusalOf(pair(8, 7));
+  EXPECT_TRUE(mentions(early, "('rope', 1) is stamped 1.000000 s after ('rope', 2)")) << early;
 }
 
 TEST_F(RopeGrammar, WhatIsDrawnBesides) {

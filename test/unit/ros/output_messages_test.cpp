@@ -18,11 +18,11 @@ namespace {
 Outcome nothingFound(StepStatus status, StartState start, const std::string& reason = "") {
   Outcome outcome;
   outcome.answered = true;
-  outcome.claim.add(0, 1, {});
   outcome.status = status;
   outcome.reason = reason;
   outcome.start_state = start;
-  if (status != StepStatus::OK) outcome.unproved.push_back(reason);
+  outcome.claim = Claim::thatWasSaid({});
+  if (status != StepStatus::OK) outcome.claim.answer(Question::CONTENTS, reason);
   if (start == StartState::INTERSECTING) outcome.touching = Touching::LASTING;
   return outcome;
 }
@@ -38,7 +38,7 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   EXPECT_EQ(summaryOf(nothingFound(StepStatus::OK, StartState::INTERSECTING)),
             "no contact found, but starts INTERSECTING");
   Outcome doubtful = nothingFound(StepStatus::OK, StartState::CLEAR);
-  doubtful.unproved = {"1 vertex is not finite"};
+  doubtful.claim = Claim::thatWasSaid({"1 vertex is not finite"});
   EXPECT_EQ(summaryOf(doubtful), "no contact found, but 1 vertex is not finite, starts CLEAR");
   Outcome unanswered;
   unanswered.status = StepStatus::GAP;
@@ -193,7 +193,7 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   const auto none = toFirstContact(quiet, bodies, "world");
   EXPECT_FALSE(none.contact);
   EXPECT_EQ(none.expected_contacts, 1u);
-  EXPECT_EQ(none.summary, "no contact found, but 1 expected ones, starts CLEAR");
+  EXPECT_EQ(none.summary, "only what is expected touches: 1 expected contact");
   const auto later = toTimeToContact(quiet, 2, bodies, "world");
   EXPECT_FALSE(later.contact);
   EXPECT_EQ(later.expected_contacts, 1u);
@@ -205,8 +205,8 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_EQ(first.time_of_contact, ros::Time(0, 500000000));
   EXPECT_EQ(first.expected_contacts, 1u);
   EXPECT_EQ(first.summary,
-            "contact 0.500000 s into the step: vertex 1 of cloth and face 0-1-2 of finger, besides 1 expected ones, "
-            "starts CLEAR");
+            "contact 0.500000 s into the step: vertex 1 of cloth and face 0-1-2 of finger, besides 1 expected "
+            "contact, starts CLEAR");
   EXPECT_EQ(toTimeToContact(alarm, 2, bodies, "world").seconds, 1);
 
   deformable_ccd::State state = toState(quiet, "world");
@@ -215,6 +215,30 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_FALSE(state.clear);
   EXPECT_EQ(state.touching, deformable_ccd::State::EXPECTED);
   EXPECT_EQ(state.expected, quiet.expected);
+}
+
+TEST(State, ADoubtStandsBesideTheProof) {
+  const std::string doubt = "body 'rope': the mesh is 600 m across";
+  const auto stateOf = [&](const Outcome& outcome) {
+    deformable_ccd::State state;
+    fillState(statementOf(outcome, "", "", {doubt}), state);
+    return state;
+  };
+  const auto proved = stateOf(nothingFound(StepStatus::OK, StartState::CLEAR));
+  EXPECT_TRUE(proved.proved && proved.clear);
+  EXPECT_EQ(proved.reason, "proved, nothing touches; in doubt: " + doubt);
+  const auto lost = stateOf(nothingFound(StepStatus::PARTIAL, StartState::CLEAR, "2 vertices were lost"));
+  EXPECT_EQ(lost.reason, "not proved: 2 vertices were lost; in doubt: " + doubt);
+  // What it may be the cause of is not to be cured otherwise.
+  const auto cut = stateOf(nothingFound(StepStatus::TRUNCATED, StartState::CLEAR, "too many"));
+  EXPECT_EQ(cut.reason, "not proved: " + doubt + "; too many");
+  EXPECT_EQ(cut.missing.front(), doubt);
+  Outcome listed = nothingFound(StepStatus::OK, StartState::CLEAR);
+  listed.status = StepStatus::TRUNCATED;  // the list is cut, and all of it was looked at
+  const Statement said = statementOf(listed, "", "", {doubt});
+  EXPECT_TRUE(said.is_doubts_fault);
+  EXPECT_EQ(said.hint, "");
+  EXPECT_EQ(stateOf(listed).reason, proved.reason);
 }
 
 TEST(State, ReasonIsEnoughByItself) {
@@ -247,7 +271,7 @@ TEST(State, ReasonIsEnoughByItself) {
   outcome.patches = {second};
   outcome.patches[0].beginning = PatchBeginning::INITIAL;
   outcome.status = StepStatus::NO_MAP;
-  outcome.unproved = {"no octomap has been received yet; checked without it"};
+  outcome.claim = Claim::thatWasSaid({"no octomap has been received yet; checked without it"});
   EXPECT_EQ(
       reasonOf("the map has new voxels"),
       "not proved: no octomap has been received yet; checked without it; what touches lasts: "
@@ -259,6 +283,15 @@ TEST(State, ReasonIsEnoughByItself) {
 TEST(Advice, AMapThatWasRefusedIsToBeCorrected) {
   EXPECT_EQ(adviceFor(StepStatus::NO_MAP, "the octomap was refused: box.stl: no header; checked without it", "box.stl"),
             "correct the map of box.stl, or do without with effects/octomap: off");
+}
+
+TEST(Advice, WhatWasGivenIsToBeCorrected) {
+  const std::string lost = "publish NaN for points that were lost";
+  EXPECT_EQ(adviceFor(StepStatus::VERTEX_COUNT, "12 points, but topology/rows x topology/cols is 3 x 5 = 15", ""),
+            "correct topology/rows and topology/cols (rows:= and cols:= of the launch files), and " + lost);
+  EXPECT_EQ(adviceFor(StepStatus::VERTEX_COUNT, "3 points, but the topology file has 4 vertices", ""),
+            "give this mesh's own as topology/file, and " + lost);
+  EXPECT_EQ(adviceFor(StepStatus::VERTEX_COUNT, "1 points, but a polyline needs 2", ""), lost);
 }
 
 /// Bytes as they go over the wire.

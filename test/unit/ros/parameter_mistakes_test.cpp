@@ -98,6 +98,9 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"topology: {rows: 1, cols: 4}", "~topology/rows and cols must be 2 or more"},
       {"topology: {source: polyline, rows: 2, cols: 3}", "~topology/rows has no meaning for a polyline"},
       {"topic: /a, bodies: {cloth: {topic: /b}}", "~topic (mesh:= of the launch files) has no place beside bodies"},
+      {"topology: {rows: 3, cols: 4}, bodies: {cloth: {topic: /b}}",
+       "~topology (topology:=, rows:= and cols:= of the launch files) has no place beside bodies; set "
+       "bodies/NAME/topology instead"},
       {"exclude_boxes: [[1, 0, 0, 0, 1, 1]]", "~exclude_boxes holds a box whose min exceeds its max"},
       {"exclude_boxes: [[1, 0]]", "~exclude_boxes must hold lists of 6 numbers"},
       {"exclude_boxes: [[a, 0, 0, 1, 1, 1]]", "~exclude_boxes holds a string where a number is needed"},

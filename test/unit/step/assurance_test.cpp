@@ -61,7 +61,7 @@ struct Missing {
 
 const std::vector<Missing>& list() {
   static const std::vector<Missing> LIST = {
-      {"a position", "1 vertex is not finite", lose},
+      {"a position", "1 vertex is not finite and was not checked (the first is 3 of 'upper')", lose},
       {"a face", "7 faces were sent that cannot be used", [](Asked& a) { a.upper().dropped_faces = 7; }},
       {"a surface at a vertex", "13 vertices belong to no face and no edge", loosen},
       {"a rigid body's surface", "16 vertices belong to no face and no edge", leaveRigidPoints},
@@ -73,7 +73,7 @@ const std::vector<Missing>& list() {
       {"the start state", "whether surfaces cross at the start", [](Asked& a) { a.options.check_start_state = false; }},
       {"the time that it takes", "the step budget ran out", [](Asked& a) { a.options.step_budget_ms = 1e-6; }},
       {"paths that were seen", "was seen elsewhere", [](Asked& a) { a.step.off_path = "upper was seen elsewhere"; }},
-      {"parts enough for a turn", "max_substeps is 2", turnFar},
+      {"parts enough for a turn", "at most 2 are allowed", turnFar},
   };
   return LIST;
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <set>
 
+#include "step/conclude.h"
 #include "support/heap.h"
 #include "support/said.h"
 #include "support/shapes.h"
@@ -142,6 +143,36 @@ TEST(Detector, VerticesThatAreNotFiniteAreCounted) {
   EXPECT_EQ(result.stats.unchecked_faces, faces);
 }
 
+// A rope that repeats a point has the edges of the first one: the second goes where that goes.
+TEST(Detector, AVertexWithoutAnEdgeIsLookedAtWhereOneWithAnEdgeIs) {
+  const Positions t0 = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 0, 0}}, t1 = {{0, 0, 1}, {1, 0, 1}, {2, 0, 1}, {1, 0, 1}};
+  Body body;
+  body.topology = share(Topology::fromEdges(4, {{0, 1}, {1, 2}}));
+  const auto loose = [&](Positions start, Positions end) {
+    body.t0 = share(std::move(start));
+    body.t1 = share(std::move(end));
+    return looseVertices(body);
+  };
+  Positions elsewhere = t1, lost = t1;
+  elsewhere[3][1] = 1e-300;
+  lost[3][1] = NOT_A_NUMBER;
+  EXPECT_EQ(loose(t0, t1), 0u);
+  EXPECT_EQ(loose(t0, elsewhere), 1u);
+  EXPECT_EQ(loose(t0, lost), 1u);
+  lost[1] = lost[3];
+  EXPECT_EQ(loose(t0, lost), 1u) << "neither is looked at";
+  body.waypoints = {{0.5, {}, share(elsewhere)}};
+  EXPECT_EQ(loose(t0, t1), 1u) << "it leaves in between";
+  body.waypoints = {};
+  body.vertex_mask = {1};
+  EXPECT_EQ(loose(t0, t1), 1u) << "what is left out looks at nothing";
+  body.vertex_mask = {};
+  body.radius_m = share(std::vector<double>{0, 0, 0, 1});
+  EXPECT_EQ(loose(t0, t1), 1u) << "it may be elsewhere";
+  body.radius_m = share(std::vector<double>(4, 1.0));
+  EXPECT_EQ(loose(t0, t1), 0u);
+}
+
 // The same detector, with vertices that come and go: what is left out of one step must be back in the next.
 TEST(Detector, VerticesComeBack) {
   const TestStep step = crumpled(6, 1, 9);
@@ -213,8 +244,8 @@ TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
   options.max_compute_ms = NOT_A_NUMBER;
   expectContains(refused(step.motion(), options), {"max_compute_ms", "nan"});
   motion = step.motion();
-  motion.bodies[0].reference = share(ReferenceFrame{Positions(3, Vec3::Zero()), {0.1}});
-  expectContains(refused(motion), {"body_0", "3", "reference frame"});
+  motion.bodies[0].reference = share(Positions(2, Vec3::Zero()));
+  expectContains(refused(motion), {"body_0", "needs 3 positions in its reference frame, got 2"});
   detector.setOptions(Options());
   // And goes on as if nothing had happened.
   EXPECT_EQ(difference(detector.run(step.motion()).contacts, runOnce(step, {}).contacts), "");

@@ -290,23 +290,6 @@ TEST(EffectPlan, AnUncertaintyCountsWhereItsBodyMeetsSomething) {
   EXPECT_THROW(EffectPlan(scene, {{Effect::TRACKER_NOISE, EffectSetting::ON}}), std::invalid_argument);
 }
 
-// Only a body's own features are left out, and only of what they carry.
-TEST(EffectPlan, WhatIsLeftOutIsToldWhereItWouldBeCarried) {
-  const std::string left_out =
-      "; 7 pairs of a body's own features are closer in its reference frame and left out of it";
-  EffectScene scene = cloth();
-  scene.bodies[0].separations = {{OBSTACLE_BODY, 0.03}};
-  scene.noise = {"0.003 m"};
-  scene.left_out_pairs = 7;
-  scene.map_used = true;
-  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.03 m") << "from the map alone";
-  EXPECT_EQ(saidOf(scene, "tracker_noise"), "vertices are only known to a radius (cloth: 0.003 m)" + left_out);
-  scene.bodies[0].separations = {{0, 0.03}};
-  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.03 m" + left_out);
-  scene.bodies[0].self_collision = false;
-  EXPECT_EQ(saidOf(scene, "tracker_noise"), "vertices are only known to a radius (cloth: 0.003 m)");
-}
-
 /// Two triangles on top of each other and a voxel below them, all close together: each pair that may meet does.
 Step closeTogether(const std::vector<Body>& bodies, bool with_map) {
   Step step;

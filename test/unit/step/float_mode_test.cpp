@@ -88,46 +88,6 @@ TEST(FloatMode, OfTheCallerChangesNoCounter) {
   }
 }
 
-/// What is made once for all later steps: which pairs are left out of the separation, and how far apart these are.
-TEST(FloatMode, OfTheCallerChangesNoLaterAnswer) {
-  Step cloth = crumpled(5, 2, 40).motion();
-  Body& body = cloth.bodies[0];
-  const Edge& edge = body.topology->edges().front();
-  body.minimum_separation_m = ((*body.t0)[edge[0]] - (*body.t0)[edge[1]]).norm();
-  body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*body.t0, {}});
-  Options options;
-  options.accuracy.rung = Accuracy::CONSERVATIVE;  // whose minimum separation may be above 0
-  const auto distancesAfter = [&](int mode) {
-    History history;
-    const RoundingMode rounding(mode);
-    detect(cloth, options, history);
-    EXPECT_EQ(std::fegetround(), mode);
-    const LeftOutOfBody& left_out = History::Impl::of(history).prepared.left_out.of_body[0];
-    const SceneBody& ranks = History::Impl::of(history).scene.bodies()[0];
-    const Index vertices = static_cast<Index>(body.t0->size());
-    const Index edges = static_cast<Index>(body.topology->edges().size());
-    const Index faces = static_cast<Index>(body.topology->faces().size());
-    std::vector<double> distances;
-    const auto collect = [&](PairKind kind, Index first, Index firsts, Index second, Index seconds) {
-      for (std::uint64_t i = first; i < first + firsts; ++i) {
-        for (std::uint64_t j = second; j < second + seconds; ++j) {
-          const double distance_m = left_out.distance(kind, i << 32 | j);
-          if (std::isfinite(distance_m)) distances.push_back(distance_m);
-        }
-      }
-    };
-    collect(PairKind::VERTEX_FACE, ranks.vertex_begin, vertices, ranks.face_begin, faces);
-    collect(PairKind::EDGE_EDGE, ranks.edge_begin, edges, ranks.edge_begin, edges);
-    EXPECT_EQ(distances.size(), history.leftOut().size());
-    return distances;
-  };
-  const std::vector<double> usual = distancesAfter(FE_TONEAREST);
-  ASSERT_GT(usual.size(), 100u);
-  for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
-    EXPECT_EQ(distancesAfter(mode), usual) << "mode " << mode;
-  }
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd

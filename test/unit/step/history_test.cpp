@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <tuple>
 
 #include "dccd/stream.h"
 #include "step/history.h"
@@ -96,7 +97,71 @@ TEST(History, EverySeamLeavesNothingBehind) {
   Detector detector;
   detector.run(first.motion());
   detector.run(other);
-  expectSame(detector.run(next.motion()), expected);
+  expectSameAnswer(detector.run(next.motion()), expected);
+}
+
+/// What is made of a mesh once takes as long as many steps: of bodies that stay it stays.
+TEST(History, NothingIsMadeAnewOfBodiesBeforeOneThatComesOrGoes) {
+  const TestStep first = clothsInABox();
+  Step more = nextOf(first).motion();
+  Body rod = more.bodies[2];
+  rod.name = "rod";
+  more.bodies.push_back(rod);
+  Detector detector;
+  detector.run(first.motion());
+  const std::vector<SceneBody>& bodies = History::Impl::of(detector.history()).scene.bodies();
+  const auto placesOf = [&] {
+    std::vector<const Index*> places;
+    for (std::size_t b = 0; b < 3; ++b) places.push_back(bodies[b].tree(FeatureKind::FACE).feature(0));
+    return places;
+  };
+  const std::vector<const Index*> places = placesOf();
+  for (const Step& step : {more, first.motion(), more}) {
+    detector.run(step);
+    ASSERT_EQ(bodies.size(), step.bodies.size());
+    EXPECT_EQ(placesOf(), places);
+  }
+}
+
+/// Bodies with a separation, of which some are left out of it, come, go and give way to others, wherever in the list.
+TEST(History, BodiesThatComeAndGoChangeNoAnswer) {
+  Options options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  std::size_t contacts = 0, left_out = 0;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    const Draw draw = drawFrom(9000 + seed);
+    const auto moved = [&](Positions x) {
+      for (Vec3& p : x) p += Vec3(draw(-9, 9), draw(-9, 9), draw(-9, 9)) / 400;
+      return x;
+    };
+    std::vector<Body> there;
+    History history;
+    for (int i = 0; i < 8; ++i) {
+      for (Body& body : there) body.t0 = body.t1;
+      const auto place = draw(0, static_cast<int>(there.size()));
+      if (!there.empty() && place < static_cast<int>(there.size()) && draw(0, 2) > 0)
+        there.erase(there.begin() + place);
+      if (there.empty() || draw(0, 2) > 0) {
+        const auto rows = static_cast<std::size_t>(draw(2, 6));
+        Body come = bodyOf("body " + std::to_string(i), Topology::grid(rows, 4));
+        come.t0 = come.t1 = share(moved(gridAt(rows, 4, 0.1, {0, 0, 0.03 * draw(0, 3)})));
+        come.reference = come.t0;
+        come.minimum_separation_m = 0.01 * draw(0, 6);
+        there.insert(there.begin() + std::min<int>(place, static_cast<int>(there.size())), std::move(come));
+      }
+      for (Body& body : there) body.t1 = share(moved(*body.t0));
+      Step step;
+      step.bodies = there;
+      History fresh;
+      const Outcome now = detect(step, options, history), then = detect(step, options, fresh);
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", step " + std::to_string(i));
+      expectSameAnswer(now, then);
+      contacts += now.contacts.size();
+      left_out += now.stats.left_out_met;
+    }
+  }
+  EXPECT_GT(contacts, 1000u);
+  EXPECT_GT(left_out, 1000u);
 }
 
 /// Other options make what follows from the map anew: also where there is no map any more.

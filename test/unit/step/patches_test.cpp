@@ -351,13 +351,6 @@ TEST(Patches, OfABodyWithItselfHasTheAreaOfOneSideAndOneNormal) {
   EXPECT_NEAR(std::abs(outcome.patches[0].normal.z()), 1, 1e-12);
 }
 
-TEST(Patches, AreNotMadeUnlessAskedFor) {
-  const Outcome outcome = runOnce(crumpled(3, 2, 8), Options());
-  EXPECT_GT(outcome.contacts.size(), 0u);
-  EXPECT_EQ(outcome.patches.size(), 0u);
-  EXPECT_EQ(outcome.patch_of.size(), 0u);
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd

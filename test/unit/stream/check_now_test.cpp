@@ -15,6 +15,19 @@ TEST_F(OneBody, CheckNowLooksAtTheNewestFrame) {
   EXPECT_FALSE(touching.contacts.empty());
 }
 
+// A step would wait for the other body; a question says that it was not seen for as long.
+TEST(CheckNow, ABodyThatFellSilentIsNotKnownToBeThere) {
+  for (const bool silent : {false, true}) {
+    Monitor monitor(loose(), {named("floor"), named("tip")});
+    monitor.push(1, tip(100 * MS, 1), 0);
+    for (const StampNs stamp_ns : {100 * MS, 400 * MS, silent ? 700 * MS : 500 * MS})
+      monitor.push(0, floor(stamp_ns, 0), 0);
+    const Outcome now = monitor.checkNow();
+    EXPECT_TRUE(now.answered);
+    EXPECT_EQ(assuranceOf(now).proved, !silent) << describe(assuranceOf(now));
+  }
+}
+
 /// A triangle, and one that stands on it with its tip below it.
 MeshFrame crossed(StampNs stamp_ns) {
   MeshFrame frame;

@@ -38,6 +38,22 @@ TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
   EXPECT_EQ(partial.stats.unchecked_vertices, 1u);
 }
 
+TEST_F(OneBody, InACellNothingIsProvedUntilItsQuestionsAreAnswered) {
+  MonitorOptions options = loose();
+  options.in_cell = true;
+  monitor.setOptions(options);
+  feed(pair(100 * MS, 1));
+  for (Outcome outcome : {feed(pair(200 * MS, 0.9)), monitor.checkNow()}) {
+    EXPECT_TRUE(outcome.answered);
+    EXPECT_FALSE(assuranceOf(outcome).proved);
+    for (std::size_t q = 0; q < static_cast<std::size_t>(Question::COUNT); ++q) {
+      EXPECT_FALSE(outcome.claim.holds());
+      outcome.claim.answer(static_cast<Question>(q), "");
+    }
+    EXPECT_TRUE(assuranceOf(outcome).clear());
+  }
+}
+
 TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
   feed(pair(0, 1));
   monitor.countReceived(0, 2);
@@ -72,7 +88,7 @@ TEST_F(OneBody, TooManyContactsKeepTheEarliest) {
   EXPECT_EQ(outcome.counts.certain + outcome.counts.undecided, outcome.total_contacts) << "counted before the cut";
   EXPECT_EQ(outcome.counts.mesh, outcome.total_contacts);
   EXPECT_EQ(outcome.counts.obstacle, 0u);
-  EXPECT_TRUE(outcome.unproved.empty()) << "only the list is cut";
+  EXPECT_TRUE(outcome.missing().empty()) << "only the list is cut";
 }
 
 TEST_F(OneBody, AMaskBeyondTheMeshIsNoStep) {

@@ -1,4 +1,4 @@
-// What rigid bodies reach is the same whether each face asks for cubes, or each cube, in the body's frame, for faces.
+// What bodies reach: rigid ones alike in their own frame and in the map's, others against points all over their faces.
 #include "stream/reach_search.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "support/closed_meshes.h"
+#include "support/heap.h"
 #include "support/shapes.h"
 
 namespace dccd {
@@ -36,7 +37,7 @@ class ReachSearch : public ::testing::Test {
       const int size = i % 5 == 0 ? 4 : 1;
       const auto key = [&] { return size * static_cast<int>(std::floor(between(-14, 14) / size)); };
       const OccupiedLeaf leaf = voxelAt(key(), key(), key(), static_cast<std::uint32_t>(size));
-      cubes.push_back({leaf, ReachedCube::Why::APPEARED, leafBox(leaf, VOXEL_M), -1});
+      cubes.push_back({leaf, ReachedCube::Why::APPEARED, leafBox(leaf, VOXEL_M)});
     }
     return cubes;
   }
@@ -66,8 +67,10 @@ class ReachSearch : public ::testing::Test {
     searchReach(tracked, ways, map_from_fixed, VOXEL_M, kept, &shapes_);
     std::size_t reached = 0;
     for (std::size_t i = 0; i < direct.size(); ++i) {
-      EXPECT_EQ(direct[i].body, kept[i].body) << "cube " << i;
-      reached += direct[i].body >= 0;
+      EXPECT_EQ(std::vector<std::uint16_t>(direct[i].near.begin(), direct[i].near.end()),
+                std::vector<std::uint16_t>(kept[i].near.begin(), kept[i].near.end()))
+          << "cube " << i;
+      reached += !direct[i].near.empty();
     }
     return reached;
   }
@@ -96,6 +99,83 @@ TEST_F(ReachSearch, IsTheSameInTheBodysFrame) {
     }
   }
   EXPECT_GT(reached, 2000U);
+}
+
+/// How far a cube is from a face at most, by points all over the face.
+double distanceTo(const LeafBox& box, const std::array<Vec3, 3>& t) {
+  constexpr int PARTS = 12;
+  const Eigen::Map<const Vec3> lo(box.lo), hi(box.hi);
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= PARTS; ++i) {
+    for (int j = 0; i + j <= PARTS; ++j) {
+      const Vec3 p = t[0] + (t[1] - t[0]) * i / PARTS + (t[2] - t[0]) * j / PARTS;
+      least = std::min(least, (p.cwiseMax(lo).cwiseMin(hi) - p).norm());
+    }
+  }
+  return least;
+}
+
+TEST_F(ReachSearch, OfACloth) {
+  const StepBody cloth = sheet(6, 7, {-0.5, -0.5, 0}, 0.15);
+  const double reach_m = 0.12, part_m = 0.02;  // of the points on a face, and of the places
+  std::size_t reached = 0, not_reached = 0;
+  for (int round = 0; round < 12; ++round) {
+    const Moved body = moved(0, cloth, reach_m);
+    const auto frame = [&](const Eigen::Isometry3d& pose) {
+      MeshFrame frame{0, body.topology, body.points, false};
+      for (Vec3& p : frame.positions) p = pose * p + vector(0.05);
+      return share(std::move(frame));
+    };
+    const Eigen::Isometry3d from = pose(0.5, 3);
+    const BodyWay way{{frame(from), frame(from * pose(0.15, 0.3)), 0, 1}};
+    std::vector<ReachedCube> found = cubes(300);
+    const bool whole_way = round % 4 == 0;
+    searchReach({body.tracked}, {way}, Eigen::Isometry3d::Identity(), VOXEL_M, found, &shapes_, whole_way);
+    std::vector<double> least(found.size(), std::numeric_limits<double>::infinity()), most(found.size());
+    for (int place = 0; place <= 20; ++place) {
+      Positions at = way[0].from->positions;
+      for (std::size_t v = 0; v < at.size(); ++v) at[v] += (way[0].to->positions[v] - at[v]) * place / 20;
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        double here = std::numeric_limits<double>::infinity();
+        for (const Face& f : body.topology->faces())
+          here = std::min(here, distanceTo(found[i].box, {at[f[0]], at[f[1]], at[f[2]]}));
+        least[i] = std::min(least[i], here);
+        most[i] = std::max(most[i], here);
+      }
+    }
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const bool is_near = !found[i].near.empty();
+      if (least[i] <= reach_m - 0.25 * VOXEL_M) EXPECT_TRUE(is_near) << round << " " << i << ": " << least[i];
+      if (least[i] > reach_m + part_m) EXPECT_FALSE(is_near) << round << " " << i << ": " << least[i];
+      if (whole_way && most[i] <= reach_m) EXPECT_FALSE(found[i].always.empty()) << round << " " << i;
+      if (whole_way && most[i] > reach_m + 0.25 * VOXEL_M + part_m)
+        EXPECT_TRUE(found[i].always.empty()) << round << " " << i;
+      reached += is_near;
+      not_reached += !is_near;
+    }
+    ASSERT_FALSE(HasFailure());
+  }
+  EXPECT_GT(reached, 100U);
+  EXPECT_GT(not_reached, 1000U);
+}
+
+/// Faces of a crumpled sheet as large as all that is asked for: in each of a million cells they were all listed.
+TEST_F(ReachSearch, LargeBoxesTakeLittleMemory) {
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (int i = 0; i < 2000; ++i) boxes.push_back(Eigen::AlignedBox3d(vector(5)).extend(vector(5)));
+  struct Box {
+    Vec3 lo, hi;
+  };
+  BoxGrid grid;
+  const std::size_t before = heapInUse();
+  grid.build(boxes.size(), VOXEL_M, [&](std::size_t i) { return Box{boxes[i].min(), boxes[i].max()}; });
+  EXPECT_LT(heapInUse(), before + (std::size_t{8} << 20));
+  for (int round = 0; round < 100; ++round) {
+    const Eigen::AlignedBox3d asked = Eigen::AlignedBox3d(vector(6)).extend(vector(6));
+    std::vector<bool> seen(boxes.size());
+    grid.visit(asked.min().data(), asked.max().data(), [&](std::uint32_t i) { seen[i] = true; });
+    for (std::size_t i = 0; i < boxes.size(); ++i) EXPECT_LE(asked.intersects(boxes[i]), seen[i]) << round << " " << i;
+  }
 }
 
 TEST_F(ReachSearch, ABodyThatIsNowhereReachesNothing) {

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "oracle/algebraic.h"
+#include "support/claims.h"
 #include "support/closed_meshes.h"
 #include "support/said.h"
 #include "unit/stream/monitor_support.h"
@@ -45,6 +46,7 @@ Outcome answered(std::vector<Clearance> clearances) {
   outcome.step = std::make_shared<const Step>(std::move(step));
   outcome.status = StepStatus::OK;
   outcome.answered = true;
+  outcome.claim = Claim::thatWasSaid({});
   outcome.start_ns = outcome.step->start_ns;
   outcome.stamp_ns = outcome.step->stamp_ns;
   outcome.clearances = std::move(clearances);
@@ -152,7 +154,7 @@ TEST(SafeUntil, PromisesNothingOfWhatIsNotKnown) {
   EXPECT_EQ(reasonOf(answered({good}), {{1}}), "no speed bound is known of body 'tip'");
   EXPECT_EQ(reasonOf(answered({good}), {{NONE}, {1}}), "no speed bound is known of body 'floor'");
   Outcome unproved = answered({good});
-  unproved.unproved = {"3 vertices are not finite and were not checked"};
+  unproved.claim = claimBut(Question::CONTENTS, "3 vertices are not finite and were not checked");
   EXPECT_EQ(reasonOf(unproved, bounds), "not proved: 3 vertices are not finite and were not checked");
   EXPECT_NE(reasonOf(answered({between(0, 1, apart(NONE))}), bounds), "");
   EXPECT_NE(reasonOf(answered({between(0, 1, apart(std::nan("")))}), bounds), "");
@@ -168,7 +170,7 @@ TEST(SafeUntil, OfABodyAndItselfIsToldApart) {
   EXPECT_NEAR(both.othersSeconds(), 0.5, 3e-9);
   const SafeUntil touching = safeUntil(answered({touch, other}), bounds);
   EXPECT_EQ(touching.until_ns, touching.stamp_ns);
-  EXPECT_EQ(touching.reason, "the distance of 'floor' and itself may be 0");
+  EXPECT_EQ(touching.reason, "'floor' and itself touch, and nobody expects it");
   EXPECT_NEAR(touching.othersSeconds(), 0.5, 3e-9);
   EXPECT_TRUE(touching.isPromise());
   EXPECT_FALSE(safeUntil(answered({touch}), bounds).isPromise()) << "there are no others";
@@ -177,9 +179,9 @@ TEST(SafeUntil, OfABodyAndItselfIsToldApart) {
 TEST(SafeUntil, ABudgetLeavesLowerBoundsThatHold) {
   Outcome cut = answered({between(0, 1, apart(0.25, ClearanceStatus::LOWER))});
   cut.status = StepStatus::DEADLINE;
-  cut.unproved = {"the step budget ran out"};
+  cut.claim = claimBut(Question::TIME, "the step budget ran out");
   EXPECT_NEAR(safeUntil(cut, {{1}, {0}}).seconds(), 0.25, 3e-9);
-  cut.unproved.emplace_back("vertices are not finite");
+  cut.claim.answer(Question::CONTENTS, "vertices are not finite");
   EXPECT_FALSE(safeUntil(cut, {{1}, {0}}).isPromise());
 }
 
@@ -194,7 +196,7 @@ TEST(SafeUntil, AMapThatNobodyMissesIsNoPartnerAndOneThatIsMissedIs) {
   outcome.obstacle = nullptr;
   EXPECT_TRUE(safeUntil(outcome, {{1}, {1}}).isPromise());
   outcome.status = StepStatus::NO_MAP;
-  outcome.unproved = {"no map"};
+  outcome.claim = claimBut(Question::MAP_IS_THERE, "no map");
   EXPECT_FALSE(safeUntil(outcome, {{1}, {1}}).isPromise());
 }
 
@@ -291,7 +293,7 @@ TEST(SafeUntil, WhatIsInsideOfAnotherBodyTouchesIt) {
 TEST(SafeUntil, WhatMayBeInsideForWantOfTimeIsNoPromise) {
   Outcome cut = answered({between(0, 1, apart(0.25, ClearanceStatus::LOWER))});
   cut.status = StepStatus::DEADLINE;
-  cut.unproved = {"the step budget ran out"};
+  cut.claim = claimBut(Question::TIME, "the step budget ran out");
   cut.start_state_complete = false;
   EXPECT_TRUE(safeUntil(cut, {{1}, {0}}).isPromise()) << "one above the other: the boxes around them do not meet";
   cut = changed(cut, [](Step& step) { step.bodies[1] = placed("tip", tip(1000 * MS, -0.5)); });

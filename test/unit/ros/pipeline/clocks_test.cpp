@@ -61,6 +61,20 @@ TEST(ClocksOfTwoComputers, OfTwoBodies) {
   }
 }
 
+// Once one of two that were ahead alike is set, what it was ahead by says nothing of the other.
+TEST(ClocksOfTwoComputers, OfWhichOneWasSet) {
+  Clocks bodies(scene("effects: {octomap: 'off'}, bodies: {a: {topic: a}, b: {topic: b}}"));
+  ASSERT_TRUE(assuranceOf(bodies.run(0.5, 0.5)).proved);
+  for (int i = 31; i <= 38; ++i) {
+    bodies.takeOf(1, 0.1 * i, 0.5, 1);
+    bodies.takeOf(0, 0.1 * i, 0, 0);
+    while (bodies.pipeline.nextOutcome(0, bodies.outcome)) continue;
+    EXPECT_FALSE(assuranceOf(bodies.outcome).proved) << i;
+  }
+  EXPECT_TRUE(bodies.outcome.answered) << bodies.outcome.reason;
+  EXPECT_NE(describe(assuranceOf(bodies.outcome)).find("stamps of body 'b' are up to 0.5 s later"), std::string::npos);
+}
+
 /// A cloth, and a tip that tf carries.
 XmlRpcValue clothAndTip() {
   const std::string file = ::testing::TempDir() + "clock_tip.obj";

@@ -86,6 +86,140 @@ TEST_F(Clouds, WhatCannotBecomePartOfTheMapIsSaid) {
   EXPECT_EQ(driven.feed(stamp_s + 0.1, 0.35f).status, StepStatus::OK) << "and what was seen is not lost";
 }
 
+// Maps and static bodies in these frames were in doubt; clouds were not, and steps were proved clear with them.
+TEST_F(Clouds, OneWhoseCameraMayHaveBeenElsewhereIsRefused) {
+  const auto refusal = [](Seen& scene, double stamp_s) {
+    const LoadedMap map = scene.add(tableFrom(stamp_s));
+    EXPECT_FALSE(map.surface);
+    EXPECT_NE(map.problem.find("where frame 'camera' was at its stamp is not known"), std::string::npos) << map.problem;
+    return map.problem;
+  };
+  geometry_msgs::TransformStamped higher = cameraPose(1.2);
+  higher.transform.translation.z = 2.05;
+  {
+    Seen silent;
+    silent.tell({cameraPose(1), cameraPose(4.1)});
+    EXPECT_NE(refusal(silent, 2).find("none came for more than 2 s"), std::string::npos);
+    EXPECT_TRUE(silent.add(tableFrom(1)).surface == nullptr) << "next to the hole";
+  }
+  {
+    Seen twice;
+    higher.header.stamp = ros::Time(1);
+    twice.tell({cameraPose(1), higher});
+    EXPECT_NE(refusal(twice, 1).find("came that is not used"), std::string::npos);
+  }
+  {
+    Seen carried;
+    carried.tell({above("wrist", 0, ros::Time(1)), above("wrist", 0, ros::Time(1.3))});
+    higher.header.stamp = ros::Time(1.2);
+    higher.header.frame_id = "wrist";
+    carried.tell({cameraPose(1), higher});
+    EXPECT_NE(refusal(carried, 1.1).find("changed its parent"), std::string::npos);
+    higher.header.frame_id = "world";
+  }
+  {
+    Seen contested;
+    int count = 0;
+    for (const auto& pose : {cameraPose(1), higher, cameraPose(1.4)}) {
+      tf2_msgs::TFMessage message;
+      message.transforms.push_back(pose);
+      contested.feed_tf.add(message, false, count++ % 2 == 0 ? "/one" : "/other");
+    }
+    EXPECT_NE(refusal(contested, 1.1).find("came from two publishers"), std::string::npos);
+    EXPECT_NE(refusal(contested, 1.4).find("came from two publishers"), std::string::npos);
+  }
+}
+
+// The camera's mount was corrected on /tf_static: what was seen before stayed in the map, a metre from where it is.
+TEST_F(Clouds, ThoseOfACameraThatIsSentElsewhereOnTfStaticProveNothingMore) {
+  driven.showCamera();
+  driven.feed(1, 0.35f);
+  give(add(tableFrom(1.1)));
+  driven.feed(1.2, 0.35f);
+  EXPECT_TRUE(assuranceOf(driven.outcome).clear()) << driven.outcome.reason;
+  driven.showCamera();
+  driven.showCamera("another");
+  driven.feed(1.3, 0.35f);
+  EXPECT_TRUE(assuranceOf(driven.outcome).clear()) << "it was sent again where it was";
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(cameraPose(1));
+  message.transforms[0].transform.translation.z = 2.05;
+  driven.feed_tf.add(message, true);
+  for (const double stamp_s : {1.4, 1.5}) {
+    driven.feed(stamp_s, 0.35f);
+    ASSERT_TRUE(driven.outcome.answered);
+    const std::vector<std::string> missing = driven.outcome.missing();
+    ASSERT_EQ(missing.size(), 1u);
+    EXPECT_EQ(missing[0].find("the frame 'camera' was sent elsewhere on /tf_static after"), 0u) << missing[0];
+    give(add(tableFrom(stamp_s)));  // what the first one showed stays
+  }
+}
+
+// A localisation corrected odom: what the first cloud showed moved along, and after the next cloud steps were clear.
+TEST_F(Clouds, ThoseOfANamedFrameThatMovesProveNothingMore) {
+  Seen scene(cloudScene("octomap_frame: odom"));
+  scene.showCamera();
+  const auto feedAt = [&](double stamp_s, double odom_z, bool with_cloud) {
+    scene.tell({above("odom", odom_z, ros::Time(stamp_s))});
+    if (with_cloud) scene.give(scene.add(tableFrom(stamp_s)));
+    scene.feed(stamp_s, 0.35f);
+  };
+  feedAt(1, 0, true);
+  feedAt(1.1, 0.0005, false);
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "within rigid_tolerance_m: " << scene.outcome.reason;
+  feedAt(1.2, 0.5, true);
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved);
+  const auto isDenied = [&] {
+    const std::vector<std::string> missing = scene.outcome.missing();
+    ASSERT_EQ(missing.size(), 1u);
+    EXPECT_EQ(missing[0],
+              "octomap_frame 'odom' moved by up to 0.5 m in 'world' since the first cloud; set it to a frame at rest, "
+              "and restart the monitor");
+  };
+  feedAt(1.3, 0.5, false);
+  isDenied();
+  feedAt(1.4, 0.5, true);
+  isDenied();
+  scene.pipeline.reset(StepStatus::RESET);
+  feedAt(1.5, 0.5, true);
+  feedAt(1.6, 0.5, false);
+  isDenied();
+}
+
+// What such a cloud alone had shown was in no later one, and steps were clear without a word.
+TEST_F(Clouds, OneThatWasRefusedIsNamedUntilAReset) {
+  const auto named = [&]() -> std::string {
+    for (const std::string& sentence : driven.outcome.excluded) {
+      if (sentence.find("not in the map") != std::string::npos) return sentence;
+    }
+    return {};
+  };
+  driven.showCamera();
+  give(add(tableFrom(1)));
+  driven.feed(1, 0.35f);
+  driven.feed(1.1, 0.35f);
+  EXPECT_EQ(named(), "");
+  sensor_msgs::PointCloud2 flat = tableFrom(1.1);
+  flat.fields.pop_back();
+  give(add(flat));
+  EXPECT_EQ(driven.feed(1.2, 0.35f).status, StepStatus::NO_MAP);
+  give(add(tableFrom(1.2)));
+  driven.feed(1.3, 0.35f);
+  EXPECT_EQ(named().find("1 cloud on /camera/points that came is not in the map (the newest: there is no field 'z'"),
+            0u)
+      << named();
+  for (int i = 0; i < 11; ++i) driven.clouds.miss(0, "a fault");
+  give(add(tableFrom(1.3)));
+  driven.feed(1.4, 0.35f);
+  EXPECT_EQ(named(), "at least 10 clouds on /camera/points that came are not in the map (the newest: a fault)");
+  driven.pipeline.reset(StepStatus::RESET);
+  give(add(tableFrom(1.5)));
+  driven.feed(1.5, 0.35f);
+  driven.feed(1.6, 0.35f);
+  EXPECT_TRUE(driven.outcome.answered);
+  EXPECT_EQ(named(), "");
+}
+
 TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
   Seen occupied(cloudScene("unknown_space: occupied, unknown_box: [0, 0, 0, 1, 1, 1]"));
   occupied.showCamera();
@@ -140,9 +274,10 @@ TEST_F(Clouds, OneWhoseMapIsRefusedForMemoryLeavesInDoubtWhatTheNextOneShows) {
     owner.feed(1.2, 0.9f);
     EXPECT_EQ(owner.outcome.status, refused ? StepStatus::NO_MAP : StepStatus::OK);
     held.clear();
-    owner.feed(1.3, 0.45f);
-    EXPECT_TRUE(see(cloudOf(1.3, {{0.15f, -0.15f, 0.7f}, {0.25f, -0.25f, 0.7f}})));
-    const Outcome& near = owner.feed(1.4, 0.35f);
+    owner.feed(1.5, 0.9f);
+    owner.feed(1.8, 0.45f);
+    EXPECT_TRUE(see(cloudOf(1.8, {{0.15f, -0.15f, 0.7f}, {0.25f, -0.25f, 0.7f}})));
+    const Outcome& near = owner.feed(1.9, 0.35f);
     EXPECT_FALSE(assuranceOf(near).clear()) << refused << ": " << describe(assuranceOf(near));
     EXPECT_EQ(near.step->map.own.own, 0u);
     EXPECT_EQ(near.step->map.own.doubted > 0, refused);
@@ -176,6 +311,23 @@ TEST_F(Clouds, TheLoaderWaitsForTheFrameAndForTf) {
   ASSERT_TRUE(loaded.surface) << loaded.problem;
   EXPECT_EQ(loaded.frame_id, "world");
   EXPECT_EQ(loader.refused(), 0u);
+}
+
+TEST_F(Clouds, TheLoaderCountsThoseThatGiveWayOnceThereIsAMap) {
+  XmlRpcValue tree = cloudScene("transform_timeout_s: 60.0");
+  Driven waiting(tree);
+  MapLoader loader(waiting.config, waiting.feed_tf, [] {});
+  // The first one waits for tf, in the thread or before it; of the others the last one is left.
+  for (const double stamp_s : {1.0, 1.1, 1.2, 1.3}) loader.submit(messageOf(tableFrom(stamp_s)), steadyNs());
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(cameraPose(1));
+  waiting.feed_tf.add(message, true);
+  LoadedMap loaded = next(loader);
+  while (loaded.stamp_ns != 1'300'000'000) loaded = next(loader);
+  ASSERT_EQ(loaded.missed.size(), 1u);
+  EXPECT_GE(loaded.missed[0].count, 2u);
+  EXPECT_EQ(loaded.missed[0].count, loader.dropped());
+  EXPECT_EQ(loaded.missed[0].newest, "too many came, and it gave way to a newer one");
 }
 
 TEST_F(Clouds, TheLoaderRefusesWhatTfDoesNotPlaceInTime) {

@@ -36,7 +36,7 @@ TEST(Distances, AreMeasuredWhileSomebodyAsksForThem) {
   EXPECT_LE(distance.lower_m, 0.25);
   EXPECT_GE(distance.upper_m, 0.25);
   EXPECT_EQ(driven.outcome.stats[Effect::CLEARANCE].in, driven.outcome.clearances.size());
-  EXPECT_TRUE(driven.pipeline.checkNow().clearances.empty()) << "nobody reads them there";
+  EXPECT_TRUE(driven.pipeline.checkNow(0).clearances.empty()) << "nobody reads them there";
   driven.pipeline.effects().hearDistances(false);
   EXPECT_TRUE(driven.feed(1.3, 0.25f).clearances.empty());
 

@@ -22,6 +22,36 @@ TEST(Map, OneThatIsNamedIsMissedFromTheFirstStepOn) {
   EXPECT_TRUE(assuranceOf(unnamed.feed(1.1, 0.34f)).clear()) << "nobody called for one";
 }
 
+// A camera's map holds the cloth itself, which looks like a run with contacts, all of it proved.
+TEST(Map, OneThatIsOccupiedAlongABodyFromTheFirstStepOnIsDoubted) {
+  const std::vector<std::string> doubt{
+      "the map was occupied where 'mesh' was: does it hold 'mesh' itself? Then set own_voxels_m: auto"};
+  struct Case {
+    std::string parameters;
+    float first_z, next_z, tilt;
+    std::vector<std::string> doubts;
+  };
+  for (const Case& one : {
+           Case{"", -0.05f, -0.05f, 0, doubt},
+           {"", -0.05f, 0.15f, 0, doubt},                  // and what follows from it may last
+           {"", -0.15f, -0.15f, 0.1f, doubt},              // half of it
+           {"", -0.05f, -0.05f, 0.1f, {}},                 // one vertex of four
+           {"", 0.15f, -0.05f, 0, {}},                     // it went there
+           {"own_voxels_m: auto", -0.05f, -0.05f, 0, {}},  // which has doubts of its own
+           {"against_obstacle: false", -0.05f, -0.05f, 0, {}},
+       }) {
+    Driven driven(scene(one.parameters));
+    driven.giveMap(1);
+    driven.feed(1, one.first_z, {}, "world", one.tilt);
+    driven.feed(1.1, one.first_z, {}, "world", one.tilt);
+    driven.feed(1.2, one.next_z, {}, "world", one.tilt);
+    EXPECT_EQ(driven.pipeline.doubts(), one.doubts) << one.parameters << ' ' << one.first_z << ' ' << one.tilt;
+    EXPECT_EQ(driven.pipeline.statement().doubts, one.doubts);
+    driven.pipeline.reset(StepStatus::RESET);
+    EXPECT_TRUE(driven.pipeline.doubts().empty());
+  }
+}
+
 // Which of the two shows how things are now?
 TEST(Map, OneThatComesAfterALaterOneIsInDoubt) {
   Driven driven(scene("octomap_topic: /table"));

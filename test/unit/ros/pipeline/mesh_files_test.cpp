@@ -46,6 +46,9 @@ TEST(Inside, AClothInARigidBodyOfAnStlIsNoClearStart) {
   EXPECT_EQ(inside.intersections[0].body, (std::array<std::uint16_t, 2>{0, 1}));
   EXPECT_EQ(inside.intersections[0].vertex, (std::array<Index, 5>{0, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX}));
   EXPECT_FALSE(assuranceOf(inside).clear());
+  EXPECT_TRUE(mentions(wrong.pipeline.statement().touches,
+                       "cloth lies inside of finger, which is 40 m across: rigid/scale: 0.001 if its file is in"))
+      << wrong.pipeline.statement().touches;
 
   XmlRpcValue tree = clothAndFinger();
   tree["bodies"]["finger"]["rigid"]["scale"] = 0.001;
@@ -84,10 +87,12 @@ TEST(Files, FacesThatCannotBeUsedAreUnchecked) {
 TEST(Inside, AMeshFileInMillimetresIsHintedAt) {
   XmlRpcValue tree = clothAndFinger();
   EXPECT_EQ(Driven(tree).pipeline.hint(1), "") << "40 m are no millimetres for sure";
+  EXPECT_TRUE(Driven(tree).pipeline.doubts().empty());
   tree["bodies"]["finger"]["rigid"]["scale"] = 2.0;
   const std::string hint = Driven(tree).pipeline.hint(1);
   EXPECT_NE(hint.find("finger.stl is 80 m across"), std::string::npos) << hint;
   EXPECT_NE(hint.find("are these millimetres? Then set rigid/scale: 0.002"), std::string::npos) << hint;
+  EXPECT_EQ(Driven(tree).pipeline.doubts(), (std::vector<std::string>{"body 'finger': " + hint}));
 }
 
 std::string errorOf(const XmlRpcValue& tree) {

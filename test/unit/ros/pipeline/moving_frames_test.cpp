@@ -178,6 +178,7 @@ TEST(RigidBodies, AreLookedAtByWhatCarriedThemThen) {
       scene.tell({tip});
     }
     scene.move("arm", 0.07, dip);
+    scene.move("arm", 0.072, 0.5);  // before the middle of the step, which is looked at as well
     scene.offer(0, 0);
     scene.offer(0.05, 0);
     scene.offer(0.1, 0);
@@ -313,7 +314,7 @@ TEST(Map, ThatMovesAgainstTheFixedFrameIsNoClearStep) {
   scene.move("odom", 0.25, -0.3);
   scene.offer(0.25, 0.05f);
   EXPECT_FALSE(assuranceOf(scene.outcome).proved);
-  EXPECT_FALSE(assuranceOf(scene.pipeline.checkNow()).proved) << "nor by a question";
+  EXPECT_FALSE(assuranceOf(scene.pipeline.checkNow(0)).proved) << "nor by a question";
   scene.move("odom", 0.3, -0.3);
   scene.offer(0.3, 0.05f);
   EXPECT_FALSE(assuranceOf(scene.outcome).proved) << "it stays where the map is not held";

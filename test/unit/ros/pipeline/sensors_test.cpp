@@ -151,6 +151,7 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
   };
   const auto info = [](const std::function<void(sensor_msgs::CameraInfo&)>& change) {
     sensor_msgs::CameraInfo one = infoOf();
+    one.header.stamp = ros::Time(1);  // the pictures' own
     change(one);
     return one;
   };
@@ -182,6 +183,70 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
   Seen without;
   without.showCamera();
   EXPECT_TRUE(says(without.add(good).problem, "no CameraInfo has come on /camera/camera_info; name its topic"));
+}
+
+/// Of a camera that is zoomed in or out.
+sensor_msgs::CameraInfo infoAt(double stamp_s, double focal_px = FOCAL_PX) {
+  sensor_msgs::CameraInfo out = infoOf();
+  out.header.stamp = ros::Time(stamp_s);
+  out.P[0] = out.P[5] = focal_px;
+  return out;
+}
+
+struct Zooming : Seen {
+  Zooming() : Seen(cloudScene()) { showCamera(); }
+  std::string hear(const sensor_msgs::CameraInfo& info) { return clouds.setCameraInfo(0, "", bytesOf(info)); }
+  std::string whyNot(double stamp_s) { return add(pictureOf(stamp_s, tableDepth)).problem; }
+};
+
+// It was that of the CameraInfo that came last.
+TEST(Sensors, APictureIsOfTheCameraInfoOfItsStamp) {
+  const LoadedMap expected = Camera().add(pictureOf(1, tableDepth));
+  for (const bool is_last : {false, true}) {
+    Zooming camera;
+    for (const bool is_own : {!is_last, is_last}) camera.hear(is_own ? infoAt(1) : infoAt(1.1, 640));
+    const LoadedMap map = camera.add(pictureOf(1, tableDepth));
+    ASSERT_TRUE(map.surface) << map.problem;
+    EXPECT_EQ(keysOf(*map.surface), keysOf(*expected.surface)) << is_last;
+    EXPECT_TRUE(says(camera.whyNot(1.05),
+                     "no CameraInfo of its stamp has come on /camera/camera_info, and those around it differ"));
+  }
+  Zooming two;
+  two.hear(infoAt(1));
+  two.hear(infoAt(1, 640));
+  EXPECT_TRUE(says(two.whyNot(1), "two CameraInfos of its stamp on /camera/camera_info differ"));
+  Zooming steady;
+  steady.hear(infoAt(1));
+  steady.hear(infoAt(1.1));
+  EXPECT_EQ(steady.whyNot(1.05), "") << "all say the same";
+  two.hear(infoAt(1.2));
+  EXPECT_EQ(two.whyNot(1.2), "") << "its own, whatever those before were";
+}
+
+TEST(Sensors, APictureWaitsForItsCameraInfoWhereThoseAroundItDiffer) {
+  Zooming camera;
+  camera.hear(infoAt(0.8));
+  camera.hear(infoAt(0.9, 640));
+  const LoadedMap map = camera.clouds.add(messageOf(pictureOf(1, tableDepth), 0, 1), [&] {
+    camera.hear(infoAt(1));
+    return true;
+  });
+  EXPECT_EQ(map.problem, "");
+}
+
+TEST(Sensors, ACameraInfoThatComesLaterAndIsAnotherOneIsTold) {
+  Zooming camera;
+  EXPECT_EQ(camera.hear(infoAt(1)), "");
+  EXPECT_EQ(camera.whyNot(1), "");
+  EXPECT_EQ(camera.whyNot(1.1), "");
+  EXPECT_EQ(camera.hear(infoAt(1.1)), "") << "it says what those before said";
+  EXPECT_EQ(camera.whyNot(1.2), "");
+  EXPECT_TRUE(says(camera.hear(infoAt(1.2, 640)),
+                   "the CameraInfo on /camera/camera_info of the picture at 1.200000000 s came after that was used"));
+  EXPECT_NE(camera.hear(infoAt(1, 640)), "") << "two of one stamp";
+  EXPECT_EQ(camera.hear(infoAt(1.3, 640)), "") << "of no picture that was used";
+  sensor_msgs::CameraInfo bare = infoAt(0, 32);
+  EXPECT_EQ(camera.hear(bare), "") << "of no stamp";
 }
 
 TEST(Sensors, OfACutMessageNothingIsTaken) {
@@ -301,6 +366,28 @@ TEST(Sensors, NoReturnIsAMapAndClearsIfSaid) {
   lidar.add(pointsOf(1, tableDepth, false));
   EXPECT_TRUE(says(lidar.add(cloudOf(1, {{0, 0, 1}, {NO_RETURN, NO_RETURN, NO_RETURN}})).hint,
                    "they are no pixels in rows, and nobody knows where these looked"));
+}
+
+// It was taken for 65.535 m, and cleared all that was nearer.
+TEST(Sensors, TheLargestNumberOfAPictureIsNoMeasurement) {
+  for (const bool big_endian : {false, true}) {
+    const auto all = [&](float depth_m) {
+      return pictureOf(
+          1, [=](std::uint32_t, std::uint32_t) { return depth_m; }, "16UC1", big_endian);
+    };
+    Camera camera("obstacle_no_return: clears, obstacle_max_range_m: 2.0");
+    const LoadedMap before = camera.add(pictureOf(1, tableDepth));
+    ASSERT_TRUE(before.surface) << before.problem;
+    const Depth left_lost = [](std::uint32_t column, std::uint32_t) { return column < 32 ? 65.535f : 1.0f; };
+    LoadedMap map;
+    for (int i = 0; i < 4; ++i) map = camera.add(pictureOf(1, left_lost, "16UC1", big_endian));
+    ASSERT_TRUE(map.surface) << map.problem;
+    EXPECT_EQ(keysOf(*map.surface), keysOf(*before.surface)) << "what was seen there before stays";
+    EXPECT_TRUE(says(camera.whyNot(all(65.535f)), "none of its 4096 points is finite"));
+    for (int i = 0; i < 20; ++i) map = camera.add(all(65.534f));
+    ASSERT_TRUE(map.surface) << map.problem;
+    EXPECT_EQ(map.surface->leafCount(), 0u) << "the next smaller one is a depth";
+  }
 }
 
 TEST(Sensors, WhatLiesBeyondTheOctreeIsRefusedWithItsCure) {

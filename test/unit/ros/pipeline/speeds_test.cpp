@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "dccd/assurance.h"
 #include "output/output_messages.h"
 #include "output/safe_until_messages.h"
+#include "support/closed_meshes.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
+#include "unit/ros/stl_text.h"
 
 namespace dccd {
 namespace test {
@@ -31,7 +34,7 @@ TEST(SpeedParameters, HoldForAllBodiesAndForOne) {
       "bodies:\n"
       "  cloth: {topic: a}\n"
       "  person: {topic: b, max_speed_m_s: 1.6, slows_down: false, max_acceleration_m_s2: 0}\n"
-      "  free: {topic: c, max_speed_m_s: 0}\n"
+      "  free: {topic: c, max_speed_m_s: none}\n"
       "  table: {topic: d, motion: static}\n");
   ASSERT_EQ(config.bodies.size(), 4u);
   const auto bodyOf = [&](const std::string& name) {
@@ -59,6 +62,9 @@ TEST(SpeedParameters, MistakesAreNamed) {
   for (const auto& [yaml, part] : {
            std::pair{"max_speed_m_s: -1\n", "max_speed_m_s"},
            {"max_speed_m_s: .inf\n", "max_speed_m_s"},
+           {"max_speed_m_s: 0\n", "max_speed_m_s is 0; what stands still is motion: static, or rigid in the fixed "},
+           {"robot: {description: d, max_speed_m_s: 0}\n", "where nothing is to be promised write none"},
+           {"max_speed_m_s: nothing\n", "max_speed_m_s is 'nothing', it must be one of none"},
            {"max_speed_m_s: .nan\n", "max_speed_m_s"},
            {"max_acceleration_m_s2: -1\n", "max_acceleration_m_s2"},
            {"max_acceleration_m_s2: 1\naccuracy: exact\n", "max_acceleration_m_s2 asks for room beside straight paths"},
@@ -130,6 +136,7 @@ Outcome distant(double lower_m, ClearanceStatus status) {
   outcome.step = std::make_shared<const Step>(step);
   outcome.status = StepStatus::OK;
   outcome.answered = true;
+  outcome.claim = Claim::thatWasSaid({});
   outcome.stamp_ns = step.stamp_ns;
   Clearance pair;
   pair.body = {0, OBSTACLE_BODY};
@@ -171,6 +178,19 @@ TEST(SafeUntilMessage, SaysUntilWhenWhoAndWhatItRestsOn) {
   near.step = std::make_shared<const Step>(doubtful);
   EXPECT_EQ(toSafeUntil(near, watch, bounds, ros::Time(1.1), "world").assumed[2],
             "voxels of the map in doubt are no obstacle: 25");
+}
+
+TEST(SafeUntilMessage, NoMoreIsLeftThanWasPromisedWhereStampsAreAhead) {
+  const Outcome outcome = distant(0.3, ClearanceStatus::MEASURED);
+  PromiseWatch watch;
+  watch.setBounds({{0.5}});
+  watch.follow(outcome);
+  const auto leftAt = [&](double now_s) {
+    return toSafeUntil(outcome, watch, {{0.5}}, ros::Time(now_s), "world").left;
+  };
+  EXPECT_NEAR(leftAt(0.1), 0.6, 1e-8) << "what is stamped 0.9 s ahead was there when it came";
+  EXPECT_NEAR(leftAt(1.0), 0.6, 1e-8);
+  EXPECT_NEAR(leftAt(1.7), -0.1, 1e-8) << "it is over";
 }
 
 TEST(SafeUntilMessage, HasNoNumberWhereNothingIsKnown) {
@@ -248,6 +268,31 @@ TEST(PromisesOfAPipeline, AreVoidOnceOtherContactsAreExpected) {
   EXPECT_THROW(pipeline.setPhase("fold"), ParameterError);
   pipeline.reconfigure([](MonitorOptions& options, MarkerConfig&) { options.detector.max_contacts = 5; });
   EXPECT_TRUE(pipeline.promises().promise().isPromise()) << "it does not rest on what is listed";
+}
+
+// README's table: `frame` is the fixed frame. In another one it may be carried about.
+TEST(PromisesOfAPipeline, ARigidBodyInTheFixedFrameStandsStill) {
+  const std::string file = ::testing::TempDir() + "table.stl";
+  std::ofstream(file) << stlText(box({0, 0, -0.1}, {0.5, 0.5, 0}));
+  for (const std::string frame : {"world", "trolley"}) {
+    Driven cloth(
+        scene("effects: {octomap: 'off'}, max_speed_m_s: 0.6, bodies: {cloth: {topic: cloth}, table: {rigid: "
+              "{frame: " +
+              frame + ", mesh: '" + file + "'}}}"));
+    cloth.raise("trolley", 0);
+    cloth.feed(1, 0.2f);
+    cloth.feed(1.1, 0.2f);
+    const SafeUntil& promise = cloth.pipeline.promises().promise();
+    EXPECT_NEAR(promise.closing_m_s, frame == "world" ? 0.6 : 1.2, 1e-12);
+    EXPECT_NEAR(promise.seconds(), promise.distance_m / promise.closing_m_s, 1e-6);
+    const auto message =
+        toSafeUntil(cloth.outcome, cloth.pipeline.promises(), cloth.pipeline.speedBounds(), ros::Time(1.1), "world");
+    const std::string assumed =
+        frame == "world" ? "'table' stands still" : "no vertex of 'table' is faster than 0.6 m/s";
+    EXPECT_EQ(std::count(message.assumed.begin(), message.assumed.end(), assumed), 1);
+    cloth.feed(1.2, 0.2f);
+    EXPECT_EQ(cloth.pipeline.counters().promises.kept, 1u) << cloth.pipeline.promises().broken();
+  }
 }
 
 TEST(PromisesOfAPipeline, AreForgottenByAResetForItsReason) {

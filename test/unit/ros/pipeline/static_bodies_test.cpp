@@ -56,7 +56,7 @@ TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
   EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'table' to 'world'", 0), 0u) << scene.outcome.reason;
   EXPECT_EQ(scene.pipeline.takeProblem(Tabled::TABLE), "") << "said once";
-  EXPECT_EQ(scene.pipeline.checkNow().reason, scene.outcome.reason);
+  EXPECT_EQ(scene.pipeline.checkNow(0).reason, scene.outcome.reason);
   EXPECT_EQ(scene.tables().waiting(), 1u);
 
   ASSERT_TRUE(scene.pipeline.idle(Tabled::TABLE));
@@ -118,7 +118,7 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   EXPECT_FALSE(scene.outcome.answered);
   EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'lorry' to 'world'", 0), 0u) << scene.outcome.reason;
   EXPECT_NE(scene.outcome.reason.find("body 'table'"), std::string::npos) << scene.outcome.reason;
-  const Outcome now = scene.pipeline.checkNow();
+  const Outcome now = scene.pipeline.checkNow(0);
   EXPECT_FALSE(now.answered);
   EXPECT_EQ(now.status, StepStatus::NO_BODY);
   EXPECT_EQ(now.reason, scene.outcome.reason);
@@ -160,7 +160,7 @@ TEST(StaticBodies, ARefusedFrameMakesTheOneBeforeVoid) {
       EXPECT_EQ(scene.outcome.reason.rfind("the newest frame of body 'table' was refused: ", 0), 0u)
           << scene.outcome.reason;
     }
-    EXPECT_EQ(scene.pipeline.checkNow().status, StepStatus::NO_BODY);
+    EXPECT_EQ(scene.pipeline.checkNow(0).status, StepStatus::NO_BODY);
     scene.take(Tabled::TABLE, 3, 0, 0);
     ASSERT_TRUE(feed());
   }

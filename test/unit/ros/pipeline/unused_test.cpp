@@ -382,25 +382,29 @@ TEST(Unused, AQuestionIsHeldToWhatCameAfterTheNewestFrames) {
   World world;
   world.step(0);
   ASSERT_TRUE(world.step(0.04));
-  ASSERT_TRUE(assuranceOf(world.pipeline.checkNow()).clear());
+  ASSERT_TRUE(assuranceOf(world.pipeline.checkNow(0)).clear());
   world.pipeline.take(OTHER, damaged(0.06));
-  const Assurance refused = assuranceOf(world.pipeline.checkNow());
+  const Assurance refused = assuranceOf(world.pipeline.checkNow(0));
   EXPECT_FALSE(refused.proved);
   EXPECT_NE(describe(refused).find("body 'other'"), std::string::npos) << describe(refused);
   world.give(OTHER, 0.07, 1);
   Outcome none;
   EXPECT_FALSE(world.pipeline.nextOutcome(PATIENCE_NS, none));
-  EXPECT_TRUE(assuranceOf(world.pipeline.checkNow()).clear());
+  EXPECT_TRUE(assuranceOf(world.pipeline.checkNow(0)).clear());
+
+  constexpr std::int64_t LATER_NS = 600'000'000;
+  EXPECT_NE(describe(assuranceOf(world.pipeline.checkNow(LATER_NS))).find("no frame has come for more than 0.5 s"),
+            std::string::npos);
 
   Driven mapped(scene("transform_timeout_s: 0.0"));
   mapped.giveMap(1);
   mapped.feed(1, 0.1f);
   mapped.feed(1.1, 0.1f);
-  EXPECT_TRUE(assuranceOf(mapped.pipeline.checkNow()).clear());
+  EXPECT_TRUE(assuranceOf(mapped.pipeline.checkNow(0)).clear());
   LoadedMap unplaced = decodeMapMessage(mapOf(table(), 1.2), mapped.config);
   unplaced.frame_id = "nowhere";
   mapped.pipeline.setMap(std::move(unplaced), 0);
-  const Assurance said = assuranceOf(mapped.pipeline.checkNow());
+  const Assurance said = assuranceOf(mapped.pipeline.checkNow(0));
   EXPECT_FALSE(said.proved);
   EXPECT_NE(describe(said).find("has no place"), std::string::npos) << describe(said);
 }

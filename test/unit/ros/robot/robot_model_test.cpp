@@ -334,6 +334,7 @@ TEST_F(RobotModel, AMeshInMillimetresIsHintedAt) {
                    "link 'a' is 33.6749 m across: if its mesh is in millimetres, write "
                    "scale=\"0.001 0.001 0.001\" beside its filename"))
       << joinedText(robotFrom(urdf).hints);
+  EXPECT_EQ(robotFrom(urdf).doubts, robotFrom(urdf).hints);
 }
 
 TEST_F(RobotModel, WhatIsLeftOutIsNotRead) {

@@ -1,0 +1,111 @@
+#include "stream/growth.h"
+
+#include <algorithm>
+#include <unordered_set>
+
+#include "obstacle/leaf_sets.h"
+
+namespace dccd {
+namespace {
+
+/// The voxel and those around it, as far as there are keys.
+KeyBox around(const VoxelKey& key) {
+  const auto low = [](std::uint16_t k) { return std::max(0, k - 1); };
+  const auto high = [](std::uint16_t k) { return std::min(VoxelTree::KEYS - 1, k + 1); };
+  return {{low(key.x), low(key.y), low(key.z)}, {high(key.x), high(key.y), high(key.z)}};
+}
+
+/// Whether test(packed key) is true of the voxel or one around it; not asked on once it was.
+template <class Test>
+bool anyAround(const VoxelKey& key, const Test& test) {
+  const KeyBox box = around(key);
+  for (int x = box.lo[0]; x <= box.hi[0]; ++x) {
+    for (int y = box.lo[1]; y <= box.hi[1]; ++y) {
+      for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
+        if (test(packed({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(z)})))
+          return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+void Growth::clear() {
+  grown_.clear();
+  too_many_ns_ = NEVER_NS;
+}
+
+void Growth::add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns) {
+  if (grown_.size() < MOST) return grown_.push_back({cube, is_doubted, free_ns, now_ns});
+  too_many_ns_ = std::max(too_many_ns_, free_ns);
+}
+
+void Growth::keep(const VoxelTree& now, const VoxelTree& before, StampNs since_ns, StampNs now_ns) {
+  const auto is_over = [&](const Grown& one) {
+    constexpr VoxelTree::Coverage NONE = VoxelTree::Coverage::EMPTY;
+    return one.free_ns <= since_ns || coverage(now, one.cube) == NONE ||
+           (one.added_ns != now_ns && coverage(before, one.cube) == NONE);
+  };
+  grown_.erase(std::remove_if(grown_.begin(), grown_.end(), is_over), grown_.end());
+  misses_some_ = too_many_ns_ > since_ns;
+  voxels_.clear();
+  for (const Grown& one : grown_) {
+    if (one.cube.size == 1) voxels_.insert(packed(one.cube.min));
+  }
+}
+
+bool Growth::isGroup(const VoxelKey& voxel) const {
+  std::vector<std::uint64_t> group{packed(voxel)};
+  for (std::size_t i = 0; i < group.size() && group.size() < GROUP; ++i) {
+    anyAround(unpacked(group[i]), [&](std::uint64_t key) {
+      const bool is_new = voxels_.count(key) > 0 && std::find(group.begin(), group.end(), key) == group.end();
+      if (is_new) group.push_back(key);
+      return group.size() >= GROUP;
+    });
+  }
+  return group.size() >= GROUP;
+}
+
+std::vector<OccupiedLeaf> Growth::beside(const std::vector<std::uint64_t>& keys, bool is_doubted,
+                                         StampNs& free_ns) const {
+  std::vector<OccupiedLeaf> found;
+  if (keys.empty() || grown_.empty()) return found;
+  KeyBox near = around(unpacked(keys.front()));
+  for (const std::uint64_t key : keys) {
+    const KeyBox box = around(unpacked(key));
+    for (std::size_t a = 0; a < 3; ++a) {
+      near.lo[a] = std::min(near.lo[a], box.lo[a]);
+      near.hi[a] = std::max(near.hi[a], box.hi[a]);
+    }
+  }
+  const std::unordered_set<std::uint64_t> all(keys.begin(), keys.end());
+  for (const Grown& one : grown_) {
+    if (one.is_doubted != is_doubted) continue;
+    auto take = [&](const OccupiedLeaf& voxel) {
+      const bool touches = anyAround(voxel.min, [&](std::uint64_t key) { return all.count(key) > 0; });
+      if (!touches || (one.cube.size == 1 && !isGroup(voxel.min))) return;
+      found.push_back(voxel);
+      free_ns = std::max(free_ns, one.free_ns);
+    };
+    visitVoxels(one.cube, near, take);
+  }
+  return found;
+}
+
+std::vector<std::uint64_t> Growth::touched(const std::vector<std::uint64_t>& keys,
+                                           const std::vector<OccupiedLeaf>& seeds) const {
+  if (misses_some_) return keys;
+  std::unordered_set<std::uint64_t> left(keys.begin(), keys.end());
+  std::vector<std::uint64_t> touched;
+  const auto take = [&](std::uint64_t key) {
+    if (left.erase(key) > 0) touched.push_back(key);
+    return false;
+  };
+  for (const OccupiedLeaf& seed : seeds) anyAround(seed.min, take);
+  for (std::size_t i = 0; i < touched.size(); ++i) anyAround(unpacked(touched[i]), take);
+  return touched;
+}
+
+}  // namespace dccd

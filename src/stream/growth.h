@@ -1,0 +1,57 @@
+// What grows into a body's reach from outside: it began where no body was.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <unordered_set>
+#include <vector>
+
+#include "dccd/types.h"
+#include "obstacle/voxel_tree.h"
+
+namespace dccd {
+
+/// Not thread-safe.
+class Growth {
+ public:
+  /// It appeared out of reach, or is in doubt. free_ns: when it was last free; now_ns: of the map that shows it so.
+  void add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns);
+  /// Forgets what was free no later than `since_ns`, or was not occupied ever since it was added. now, before: what
+  /// this map and the one before it show.
+  void keep(const VoxelTree& now, const VoxelTree& before, StampNs since_ns, StampNs now_ns);
+  /// Of what is kept the voxels that touch (26 neighbours) one of these, by whether they are in doubt, and belong to at
+  /// least GROUP that touch each other: one alone is a sensor's noise. keys: packed. free_ns: when the newest was free.
+  std::vector<OccupiedLeaf> beside(const std::vector<std::uint64_t>& keys, bool is_doubted, StampNs& free_ns) const;
+  /// Which of the voxels touch one of the seeds, or one that does; all where some were not kept.
+  std::vector<std::uint64_t> touched(const std::vector<std::uint64_t>& keys,
+                                     const std::vector<OccupiedLeaf>& seeds) const;
+  void clear();
+
+  static constexpr std::size_t MOST = std::size_t{1} << 18, GROUP = 4;
+
+ private:
+  static constexpr StampNs NEVER_NS = std::numeric_limits<StampNs>::min();
+  struct Grown {
+    OccupiedLeaf cube;
+    bool is_doubted;
+    StampNs free_ns, added_ns;
+  };
+  std::deque<Grown> grown_;
+  StampNs too_many_ns_ = NEVER_NS;  // of some that were not kept
+  bool misses_some_ = false;
+  std::unordered_set<std::uint64_t> voxels_;  // of grown_, packed
+
+  bool isGroup(const VoxelKey& voxel) const;
+};
+
+/// A voxel's key as one number.
+inline std::uint64_t packed(const VoxelKey& key) {
+  return std::uint64_t{key.x} << 32 | std::uint64_t{key.y} << 16 | std::uint64_t{key.z};
+}
+inline VoxelKey unpacked(std::uint64_t key) {
+  return {static_cast<std::uint16_t>(key >> 32), static_cast<std::uint16_t>(key >> 16),
+          static_cast<std::uint16_t>(key)};
+}
+
+}  // namespace dccd

@@ -1,0 +1,173 @@
+// Paths that are meant: their pieces, and where on them bodies are.
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "dccd/intended.h"
+#include "dccd/mesh_store.h"
+
+namespace dccd {
+namespace {
+
+bool isLength(double value) { return value >= 0 && std::isfinite(value); }
+
+/// The piece that holds the time, the last one at the end.
+std::size_t pieceAt(const IntendedPath& path, double time_s) {
+  const auto after = std::upper_bound(path.time_s.begin() + 1, path.time_s.end() - 1, time_s);
+  return static_cast<std::size_t>(after - path.time_s.begin()) - 1;
+}
+
+double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
+  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+}
+
+/// Corners of the box around a body at the step's end: a vertex is off a place by no more than one of them is.
+struct BoxCorners {
+  std::vector<Vec3> local, now;
+};
+
+BoxCorners boxCornersOf(const Body& body) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : *body.t1) box.extend(p);
+  BoxCorners corners;
+  for (int i = 0; i < 8; ++i) {
+    corners.now.push_back(box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
+    corners.local.push_back(body.pose_t1.inverse() * corners.now.back());
+  }
+  return corners;
+}
+
+bool isAllFinite(const Body& body) {
+  return !body.t1->empty() && body.pose_t1.matrix().allFinite() &&
+         std::all_of(body.t1->begin(), body.t1->end(), [](const Vec3& p) { return p.allFinite(); });
+}
+
+}  // namespace
+
+bool IntendedPath::has(std::uint16_t body) const {
+  return std::any_of(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });
+}
+
+std::string problemOf(const IntendedPath& path, const std::vector<Body>& bodies) {
+  const std::size_t times = path.time_s.size();
+  if (path.bodies.empty()) return "it moves no body that is watched";
+  if (times < 2) return "it is over";
+  if (path.time_s[0] != 0) return "it does not begin at 0 s";
+  for (std::size_t k = 1; k < times; ++k) {
+    if (!(path.time_s[k] > path.time_s[k - 1]) || !std::isfinite(path.time_s[k])) return "its times do not ascend";
+  }
+  if (!isLength(path.deviation_m) || !isLength(path.deviation_rate_m_s)) return "its tube is not 0 or more";
+  const bool bends = path.bend_m.size() + 1 == times && std::all_of(path.bend_m.begin(), path.bend_m.end(), isLength);
+  if (!bends) return "nobody says how far its pieces are from straight";
+  std::set<std::uint16_t> seen;
+  for (const IntendedPath::Of& of : path.bodies) {
+    if (of.body >= bodies.size()) return "it moves a body that is not there";
+    const Body& body = bodies[of.body];
+    if (!seen.insert(of.body).second) return "it moves '" + body.name + "' twice";
+    const auto isPose = [](const Eigen::Isometry3d& pose) {
+      return pose.matrix().allFinite() && (pose.linear() * pose.linear().transpose()).isIdentity(1e-6);
+    };
+    if (of.pose.size() != times || !std::all_of(of.pose.begin(), of.pose.end(), isPose))
+      return "it has not a pose of '" + body.name + "' for each time";
+    if (!isAllFinite(body)) return "nobody knows where '" + body.name + "' is";
+  }
+  return "";
+}
+
+/// What is meant leaves the chord of a piece of h seconds by a h^2 / 8 at the most, and the way from pose to pose
+/// leaves it by angle^2 r / 8: along any direction both are 0 at the ends, and these bound their second derivatives.
+void addPieces(const PosesAt& poses, double until_s, double acceleration_m_s2, double reach_m, double bend_m,
+               std::size_t most_pieces, IntendedPath& path) {
+  if (path.time_s.empty()) {
+    path.time_s.push_back(0);
+    const std::vector<Eigen::Isometry3d> first = poses(0);
+    for (std::size_t i = 0; i < path.bodies.size(); ++i) path.bodies[i].pose.push_back(first.at(i));
+  }
+  const double from_s = path.endsAt(), span_s = until_s - from_s;
+  if (!(span_s > 0)) return;
+  // Either of the two takes half of it.
+  const double wanted = std::ceil(span_s * std::sqrt(acceleration_m_s2 / (4 * bend_m)));
+  const double most = static_cast<double>(std::max<std::size_t>(1, most_pieces));
+  const auto count = static_cast<std::size_t>(wanted >= 1 ? std::min(wanted, most) : wanted < 1 ? 1 : most);
+  const double h = span_s / static_cast<double>(count);
+  for (std::size_t k = 1; k <= count; ++k) {
+    const double time_s = k == count ? until_s : from_s + static_cast<double>(k) * h;
+    const std::vector<Eigen::Isometry3d> next = poses(time_s);
+    double angle = 0;
+    for (std::size_t i = 0; i < path.bodies.size(); ++i) {
+      angle = std::max(angle, angleBetween(path.bodies[i].pose.back(), next.at(i)));
+      path.bodies[i].pose.push_back(next[i]);
+    }
+    path.time_s.push_back(time_s);
+    path.bend_m.push_back((acceleration_m_s2 * h * h + angle * angle * reach_m) / 8 * (1 + 1e-9));
+  }
+}
+
+PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_s, double to_s) {
+  PlaceOnPath best;
+  if (!problemOf(path, step.bodies).empty()) return best;
+  to_s = std::clamp(to_s, 0.0, path.endsAt());
+  from_s = std::clamp(from_s, 0.0, to_s);
+  std::vector<BoxCorners> corners;
+  for (const IntendedPath::Of& of : path.bodies) corners.push_back(boxCornersOf(step.bodies[of.body]));
+  for (std::size_t k = pieceAt(path, from_s); k + 1 < path.time_s.size(); ++k) {
+    const double begins_s = path.time_s[k], lasts_s = path.time_s[k + 1] - begins_s;
+    if (begins_s > to_s) break;
+    double along = 0, way_sq = 0;  // of the least sum of squares on the chords
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const std::vector<Eigen::Isometry3d>& pose = path.bodies[i].pose;
+      for (std::size_t c = 0; c < corners[i].now.size(); ++c) {
+        const Vec3 from = pose[k] * corners[i].local[c], way = pose[k + 1] * corners[i].local[c] - from;
+        along += way.dot(corners[i].now[c] - from);
+        way_sq += way.squaredNorm();
+      }
+    }
+    const double least = std::max(0.0, (from_s - begins_s) / lasts_s),
+                 most = std::min(1.0, (to_s - begins_s) / lasts_s);
+    const double u = std::clamp(way_sq > 0 ? along / way_sq : most, least, most);
+    double off_sq = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const Eigen::Isometry3d pose = interpolate(path.bodies[i].pose[k], path.bodies[i].pose[k + 1], u);
+      for (std::size_t c = 0; c < corners[i].now.size(); ++c)
+        off_sq = std::max(off_sq, (pose * corners[i].local[c] - corners[i].now[c]).squaredNorm());
+    }
+    const double off_m = std::sqrt(off_sq) + path.bend_m[k];
+    if (off_m < best.off_m) best = {begins_s + u * lasts_s, off_m};
+  }
+  return best;
+}
+
+IntendedPath restOf(const IntendedPath& path, double from_s) {
+  IntendedPath rest;
+  rest.deviation_m = path.deviation_m;
+  rest.deviation_rate_m_s = path.deviation_rate_m_s;
+  for (const IntendedPath::Of& of : path.bodies) rest.bodies.push_back({of.body, {}});
+  if (path.time_s.size() < 2 || !(from_s < path.endsAt())) return rest;
+  from_s = std::max(0.0, from_s);
+  const std::size_t first = pieceAt(path, from_s);
+  const double share = (from_s - path.time_s[first]) / (path.time_s[first + 1] - path.time_s[first]);
+  rest.time_s.push_back(0);
+  for (std::size_t k = first + 1; k < path.time_s.size(); ++k) rest.time_s.push_back(path.time_s[k] - from_s);
+  rest.bend_m.assign(path.bend_m.begin() + static_cast<std::ptrdiff_t>(first), path.bend_m.end());
+  for (std::size_t i = 0; i < path.bodies.size(); ++i) {
+    const std::vector<Eigen::Isometry3d>& pose = path.bodies[i].pose;
+    rest.bodies[i].pose.push_back(interpolate(pose[first], pose[first + 1], share));
+    rest.bodies[i].pose.insert(rest.bodies[i].pose.end(), pose.begin() + static_cast<std::ptrdiff_t>(first) + 1,
+                               pose.end());
+  }
+  return rest;
+}
+
+IntendedPath beginningAt(const IntendedPath& path, const Step& step) {
+  IntendedPath moved = path;
+  for (IntendedPath::Of& of : moved.bodies) {
+    const Eigen::Isometry3d begin = of.pose[0].inverse() * step.bodies[of.body].pose_t1;
+    for (Eigen::Isometry3d& pose : of.pose) pose = pose * begin;
+    of.pose[0] = step.bodies[of.body].pose_t1;
+  }
+  return moved;
+}
+
+}  // namespace dccd

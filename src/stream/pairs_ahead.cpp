@@ -1,0 +1,120 @@
+#include "stream/pairs_ahead.h"
+
+#include <sstream>
+#include <stdexcept>
+
+#include "step/parts.h"
+
+namespace dccd {
+namespace {
+
+/// The fastest of the body's vertices from any of its waypoints to the next [m/s].
+double fastestOf(const Body& body, double seconds) {
+  double fastest = 0;
+  forEachLeg(body, [&](const Positions& from, const Positions& to, double share) {
+    double way_sq = 0;
+    for (std::size_t v = 0; v < from.size(); ++v) {
+      const double one_sq = (to[v] - from[v]).squaredNorm();
+      if (std::isfinite(one_sq)) way_sq = std::max(way_sq, one_sq);
+    }
+    fastest = std::max(fastest, std::sqrt(way_sq) / (share * seconds));
+  });
+  return seconds > 0 ? fastest : SpeedBound::NONE;
+}
+
+}  // namespace
+
+std::string nameOf(const Outcome& outcome, std::size_t body) {
+  return body == OBSTACLE_BODY ? "octomap" : "'" + outcome.step->bodies[body].name + "'";
+}
+
+std::string pairOf(const Outcome& outcome, const Clearance& pair) {
+  return nameOf(outcome, pair.body[0]) + " and " + (isItself(pair) ? "itself" : nameOf(outcome, pair.body[1]));
+}
+
+std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+  std::vector<SpeedBound> bounds = given;
+  bounds.resize(outcome.step ? outcome.step->bodies.size() : 0);
+  for (std::size_t b = 0; b < bounds.size(); ++b) {
+    const auto require = [&](double value, const char* name) {
+      if (value >= 0) return;
+      std::ostringstream text;
+      text << "the speed bound of body '" << outcome.step->bodies[b].name << "' has " << name << " " << value
+           << "; it must be 0 or more";
+      throw std::invalid_argument(text.str());
+    };
+    require(bounds[b].max_m_s, "max_m_s");
+    require(bounds[b].last_step_factor, "last_step_factor");
+  }
+  return bounds;
+}
+
+std::vector<SpeedBound> boundsAfter(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+  std::vector<SpeedBound> bounds = boundsOf(outcome, given);
+  for (std::size_t b = 0; b < bounds.size(); ++b) {
+    SpeedBound& bound = bounds[b];
+    if (!(bound.last_step_factor > 0)) continue;
+    bound.max_m_s =
+        std::min(bound.max_m_s, bound.last_step_factor * fastestOf(outcome.step->bodies[b], outcome.duration_s()));
+  }
+  return bounds;
+}
+
+std::string whyNone(const Outcome& outcome) {
+  if (!outcome.answered) return std::string("no answer, ") + toString(outcome.status);
+  // What a budget cut off are pairs, whose distances are bounded nonetheless; nothing else may be open.
+  const bool only_cut = outcome.status == StepStatus::DEADLINE && outcome.claim.holdsButForTime();
+  if (!outcome.claim.holds() && !only_cut) return "not proved: " + outcome.missing().front();
+  return outcome.clearances.empty() ? "no distances were computed" : "";
+}
+
+bool counts(const Outcome& outcome, const Clearance& pair) {
+  const bool mapless = pair.body[1] == OBSTACLE_BODY && !outcome.obstacle && outcome.status != StepStatus::NO_MAP;
+  return !pair.expected && !mapless;
+}
+
+double separationOf(const Outcome& outcome, const Clearance& pair) {
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  const auto [a, b] = pair.body;
+  return b == OBSTACLE_BODY ? separationFromMap(bodies[a]) : separationBetween(bodies[a], a, bodies[b], b);
+}
+
+double distanceOf(const Outcome& outcome, const Insides& insides, const Clearance& pair) {
+  const ClearanceStatus status = pair.at_end.status;
+  if (status == ClearanceStatus::TOUCHING || status == ClearanceStatus::UNKNOWN) return 0;
+  if (insides.hold(pair)) return 0;
+  const double separation_m = separationOf(outcome, pair), rest_m = pair.at_end.lower_m - separation_m;
+  if (!(rest_m > 0) || !std::isfinite(rest_m)) return 0;
+  return separation_m > 0 ? roundedDown(rest_m) : rest_m;
+}
+
+Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
+  Speeds speeds;
+  for (const std::uint16_t body : pair.body) {
+    if (body == OBSTACLE_BODY) continue;
+    double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
+    if (!std::isfinite(bounds[body].max_m_s)) speeds.unbounded = outcome.step->bodies[body].name;
+    sum = sum == 0 ? bounds[body].max_m_s : roundedUp(sum + bounds[body].max_m_s);
+  }
+  return speeds;
+}
+
+std::string unboundedReason(const std::string& body) { return "no speed bound is known of body '" + body + "'"; }
+
+std::string zeroReason(const Outcome& outcome, const Insides& insides, const Clearance& pair) {
+  const bool unknown = pair.at_end.status == ClearanceStatus::UNKNOWN;
+  if (pair.at_end.status == ClearanceStatus::TOUCHING) return pairOf(outcome, pair) + " touch, and nobody expects it";
+  if (pair.at_end.lower_m > 0 && !unknown && insides.hold(pair)) return insides.why(pair);
+  return "the distance of " + pairOf(outcome, pair) + (unknown ? " is not known" : " may be 0");
+}
+
+double secondsTo(double distance_m, double closing_m_s) {
+  return closing_m_s == 0 ? MOST_PROMISED_S : std::min(MOST_PROMISED_S, roundedDown(distance_m / closing_m_s));
+}
+
+StampNs nsIn(double seconds) {
+  if (seconds == MOST_PROMISED_S) return static_cast<StampNs>(MOST_PROMISED_S * 1e9);
+  return static_cast<StampNs>(std::floor(roundedDown(seconds * 1e9)));
+}
+
+}  // namespace dccd

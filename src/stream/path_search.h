@@ -1,0 +1,77 @@
+// What is known of the pairs of partners of which one is on an intended path (dccd/intended.h).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "dccd/intended.h"
+#include "stream/pairs_ahead.h"
+
+namespace dccd {
+
+/// How far scales go on a path: s T_r + s^2 T_s / 2 of its time until all stands.
+struct PathPace {
+  SpeedLaw law;
+  double timeOf(double scale) const { return scale * (law.reaction_time_s + scale * law.stopping_time_s / 2); }
+  double scaleOf(double time_s) const;  ///< rounded down, 0 to 1
+};
+
+/// Two partners, and what they need along the path.
+struct PathPair {
+  std::array<std::uint16_t, 2> body{};
+  std::size_t number = SafeUntil::NO_PAIR;  ///< its row in the outcome
+  double separation_m = 0;
+  double start_m = 0;                    ///< distanceOf() at the path's begin
+  std::size_t on_path = 0;               ///< how many of the two
+  double deviation_m = 0, rate_m_s = 0;  ///< of all that are on it together
+  // Of what is not on it [m/s]: until the next frame, and at full speed of what slows down and of what does not.
+  double closing_m_s = 0, slowed_m_s = 0, other_m_s = 0;
+  double apart_s = 0;      ///< they are apart until then by bounds alone
+  double allowed_s = 0;    ///< the time of the path that the scale takes which bounds alone allow
+  bool may_scale = false;  ///< what is on the path slows down, and the other one has a bound
+  bool may_stand = false;  ///< the standing rule is for it
+  double leaves_s = 0;     ///< up to then it leaves what it touches
+  // Of the path as far as it was searched.
+  double least_m = SpeedBound::NONE;
+  bool came_nearer = false;
+
+  /// g(t) of the theorem, rounded up.
+  double untilNeeds(double ahead_s) const;
+  /// What is needed to pass the path up to the time of that scale, rounded up.
+  double scaleNeeds(double scale, const PathPace& pace) const;
+};
+
+/// Whether a body on the path moves away from what it touches, by planes (dccd/intended.h, the standing rule).
+class LeavingPlanes {
+ public:
+  /// `ends`: the vertices of the one that moves at the ends of the path's pieces; `leaves_m`: how far each piece leaves
+  /// the straight way between them.
+  LeavingPlanes(const Outcome& outcome, const PathPair& pair, std::uint16_t mover, std::vector<Positions> ends,
+                std::vector<double> leaves_m, std::vector<double> time_s, const PathPace& pace);
+  /// Up to which time of the path; 0: nothing shows it.
+  double until() const;
+
+ private:
+  struct Feature {
+    Eigen::AlignedBox3d box;
+    Positions corners;  // none: all of the box's
+  };
+  std::vector<Vec3> directions() const;
+  double untilBy(const Vec3& direction) const;
+
+  const Outcome& outcome_;
+  const PathPair& pair_;
+  std::vector<Positions> ends_;
+  std::vector<double> leaves_m_;
+  std::vector<double> time_s_;
+  PathPace pace_;
+  std::uint16_t mover_, partner_;
+  Eigen::Isometry3d to_map_ = Eigen::Isometry3d::Identity();  // the frame in which all of this is
+  std::vector<Eigen::AlignedBox3d> pieces_;                   // around the body, wider by what the piece leaves its way
+  std::vector<Feature> features_;                             // of the partner, that are not far from all pieces
+  double radius_m_ = 0, rounding_m_ = 0;
+  bool may_hold_ = false;  // one of the two may be inside of the other
+};
+
+}  // namespace dccd

@@ -1,0 +1,269 @@
+// What ~safe_until and ~speed_scale promise along an intended path, against adversaries: bodies within tubes and bounds
+// that go for contact, at any pace, judged by distances of triangles that share nothing with the engine, taken densely.
+// DEFORMABLE_CCD_LONG=1 runs 100,000 motions.
+#include "dccd/intended.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "support/query_property.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+using Triangle = std::array<Vec3, 3>;
+
+/// From a point to a segment, to a triangle, and between two segments and triangles: each by itself, plainly.
+double distanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const double u = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+  return (p - (a + u * (b - a))).norm();
+}
+
+double distanceToTriangle(const Vec3& p, const Triangle& t) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  bool is_over = normal.norm() > 0;
+  for (std::size_t i = 0; i < 3; ++i) is_over = is_over && normal.dot((t[(i + 1) % 3] - t[i]).cross(p - t[i])) >= 0;
+  if (is_over) return std::abs(normal.normalized().dot(p - t[0]));
+  double least = SpeedBound::NONE;
+  for (std::size_t i = 0; i < 3; ++i) least = std::min(least, distanceToSegment(p, t[i], t[(i + 1) % 3]));
+  return least;
+}
+
+double distanceOfSegments(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  double least = std::min(
+      {distanceToSegment(a, c, d), distanceToSegment(b, c, d), distanceToSegment(c, a, b), distanceToSegment(d, a, b)});
+  const Vec3 u = b - a, v = d - c, w = a - c;
+  const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), det = uu * vv - uv * uv;
+  if (det < 1e-12 * uu * vv) return least;
+  const double s = (uv * v.dot(w) - vv * u.dot(w)) / det, t = (uu * v.dot(w) - uv * u.dot(w)) / det;
+  if (s >= 0 && s <= 1 && t >= 0 && t <= 1) least = std::min(least, (w + s * u - t * v).norm());
+  return least;
+}
+
+bool pierces(const Vec3& a, const Vec3& b, const Triangle& t) {
+  const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double from = normal.dot(a - t[0]), to = normal.dot(b - t[0]);
+  if (from * to > 0 || from == to) return false;
+  const Vec3 at = a + from / (from - to) * (b - a);
+  for (std::size_t i = 0; i < 3; ++i)
+    if (normal.dot((t[(i + 1) % 3] - t[i]).cross(at - t[i])) < 0) return false;
+  return true;
+}
+
+double distanceOf(const Triangle& s, const Triangle& t) {
+  double least = SpeedBound::NONE;
+  for (std::size_t i = 0; i < 3; ++i) {
+    least = std::min({least, distanceToTriangle(s[i], t), distanceToTriangle(t[i], s)});
+    if (pierces(s[i], s[(i + 1) % 3], t) || pierces(t[i], t[(i + 1) % 3], s)) return 0;
+    for (std::size_t j = 0; j < 3; ++j)
+      least = std::min(least, distanceOfSegments(s[i], s[(i + 1) % 3], t[j], t[(j + 1) % 3]));
+  }
+  return least;
+}
+
+/// An arm of one to three triangles on a path of its own, and a cloth of as many, of which every vertex goes by itself.
+class Chase {
+ public:
+  explicit Chase(std::uint64_t seed) : random_(seed) {
+    arm_ = some(Vec3::Zero());
+    const Vec3 away = direction();
+    cloth_ = some(away * uniform(0.4, 1.2));
+    cloth_speed_ = uniform(0, 1) < 0.3 ? 0 : uniform(0.05, 1);
+    path_.bodies = {{0, {}}};
+    path_.deviation_m = uniform(0, 1) < 0.3 ? 0 : uniform(0, 0.05);
+    path_.deviation_rate_m_s = uniform(0, 1) < 0.3 ? 0 : uniform(0, 0.1);
+    // Towards the cloth, past it or away, and a turn about an axis through the arm.
+    const double kind = uniform(0, 1);
+    way_ = kind < 0.5 ? Vec3(away * uniform(0.1, 1)) : Vec3(direction() * uniform(0.1, 1));
+    turn_ = uniform(0, 1) < 0.3 ? Vec3(Vec3::Zero()) : Vec3(direction() * uniform(0.1, 2));
+    const double second = turn_.squaredNorm() * 0.25;
+    addPieces([&](double t) { return std::vector<Eigen::Isometry3d>{pose(t)}; }, horizon_s, second, 0.25, 1e-3, 40,
+              path_);
+    step_.bodies = {bodyOf("arm", arm_), bodyOf("cloth", cloth_)};
+    step_.bodies[0].rigid = true;
+    step_.stamp_ns = 1;
+  }
+
+  /// What is promised.
+  AlongPath ask(const std::optional<SpeedLaw>& law) {
+    Options options;
+    options.clearance.wanted = true;
+    options.clearance.max_m = 10;
+    History history;
+    const Outcome outcome = detect(step_, options, history);
+    PathSearch search;
+    return search.run(outcome, options, {{SpeedBound::NONE}, {cloth_speed_, 0, false}}, law, path_);
+  }
+
+  /// The least distance until then, of bodies that pass the path as `place` says: of each time its time on the path.
+  double leastUntil(double until_s, const std::function<double(double)>& place) {
+    constexpr int LOOKS = 48;
+    Positions cloth = cloth_;
+    double least = distanceNow(arm_, cloth);
+    for (int i = 1; i <= LOOKS; ++i) {
+      const double t = until_s * i / LOOKS;
+      Positions arm = arm_;
+      for (Vec3& p : arm) p = pose(std::min(place(t), horizon_s)) * p;
+      // Both go for the nearest of each other: the cloth vertex by vertex, the arm as far as its tube allows.
+      const auto [from, to] = nearest(arm, cloth);
+      const Vec3 along = (to - from).normalized();
+      for (Vec3& p : cloth) {
+        const Vec3 aim = i % 7 == 0 ? direction() : Vec3(-along);
+        p += aim * (cloth_speed_ * until_s / LOOKS);
+      }
+      for (Vec3& p : arm) p += along * path_.tubeAt(t) * (1 - 1e-9);
+      least = std::min(least, distanceNow(arm, cloth));
+    }
+    return least;
+  }
+
+  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+  double startsApart() const { return distanceNow(arm_, cloth_); }
+
+  static constexpr double horizon_s = 1;
+
+ private:
+  Vec3 direction() {
+    Vec3 some;
+    do {
+      some = Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    } while (some.norm() > 1 || some.norm() < 0.1);
+    return some.normalized();
+  }
+  Positions some(const Vec3& about) {
+    Positions all;
+    for (std::size_t i = 0; i < 3 * (1 + random_() % 3); ++i) all.push_back(about + 0.2 * direction());
+    all.resize(all.size() / 3 * 3);
+    return all;
+  }
+  Eigen::Isometry3d pose(double t) const {
+    Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
+    at.translation() = way_ * t;
+    if (turn_.norm() > 0) at.linear() = Eigen::AngleAxisd(turn_.norm() * t, turn_.normalized()).toRotationMatrix();
+    return at;
+  }
+  static Body bodyOf(const std::string& name, const Positions& positions) {
+    Body body;
+    body.name = name;
+    body.self_collision = false;
+    std::vector<Face> faces;
+    for (Index f = 0; f + 2 < positions.size(); f += 3) faces.push_back({f, f + 1, f + 2});
+    body.topology = share(Topology::fromTriangles(positions.size(), faces));
+    body.t0 = body.t1 = share(positions);
+    return body;
+  }
+  static double distanceNow(const Positions& a, const Positions& b) {
+    double least = SpeedBound::NONE;
+    for (std::size_t i = 0; i < a.size(); i += 3)
+      for (std::size_t j = 0; j < b.size(); j += 3)
+        least = std::min(least, distanceOf({a[i], a[i + 1], a[i + 2]}, {b[j], b[j + 1], b[j + 2]}));
+    return least;
+  }
+  /// Two vertices.
+  static std::array<Vec3, 2> nearest(const Positions& a, const Positions& b) {
+    std::array<Vec3, 2> best{a[0], b[0]};
+    for (const Vec3& p : a)
+      for (const Vec3& q : b)
+        if ((p - q).norm() < (best[0] - best[1]).norm()) best = {p, q};
+    return best;
+  }
+
+  std::mt19937_64 random_;
+  Positions arm_, cloth_;
+  double cloth_speed_ = 0;
+  Vec3 way_, turn_;
+  IntendedPath path_;
+  Step step_;
+};
+
+std::uint64_t motions() { return longRun() ? 100000 : 1500; }
+
+TEST(PathAdversary, NothingTouchesBeforeItIsSaidTo) {
+  std::size_t promised = 0, near = 0;
+  for (std::uint64_t seed = 0; seed < motions(); ++seed) {
+    Chase chase(seed);
+    const AlongPath along = chase.ask(std::nullopt);
+    ASSERT_EQ(along.unused, "") << seed;
+    if (!along.rests_on_path) continue;
+    ++promised;
+    const double until_s = along.until.seconds(), stops_s = chase.uniform(0, 1), pace = chase.uniform(0, 1);
+    double least = SpeedBound::NONE;
+    least = std::min(least, chase.leastUntil(until_s, [](double t) { return t; }));
+    least = std::min(least, chase.leastUntil(until_s, [&](double t) { return pace * t; }));
+    least = std::min(least, chase.leastUntil(until_s, [&](double t) { return std::min(t, stops_s); }));
+    ASSERT_GT(least, 0) << "seed " << seed << ", promised " << until_s << " s";
+    near += least < 0.3 * chase.startsApart();
+  }
+  EXPECT_GT(promised, motions() / 2);
+  EXPECT_GT(near, promised / 10) << "they do come near";
+}
+
+// The arm obeys: it goes on at the scale for the reaction time, and is then slower evenly until it stands. The cloth
+// does not slow down.
+TEST(PathAdversary, AnArmThatObeysStandsBeforeItTouches) {
+  std::size_t slowed = 0, full = 0;
+  for (std::uint64_t seed = 0; seed < motions(); ++seed) {
+    Chase chase(seed);
+    const SpeedLaw law{chase.uniform(0.02, 0.2), chase.uniform(0, 0.5), chase.uniform(0, 0.02)};
+    const AlongPath along = chase.ask(law);
+    const double s = along.scale.scale;
+    if (s == 0 || along.contact != PathContact::FREE) continue;
+    ++(s < 1 ? slowed : full);
+    const double stands_s = law.reaction_time_s + s * law.stopping_time_s;
+    const double least = chase.leastUntil(stands_s, [&](double t) {
+      const double brakes_s = std::max(0.0, t - law.reaction_time_s);
+      return s * t - (law.stopping_time_s > 0 ? brakes_s * brakes_s / law.stopping_time_s / 2 : 0);
+    });
+    ASSERT_GT(least, 0) << "seed " << seed << ", scale " << s;
+  }
+  EXPECT_GT(slowed, motions() / 20);
+  EXPECT_GT(full, motions() / 20);
+}
+
+// Straight for each other, as fast as tube and bound allow: the truth is a quotient.
+TEST(PathAdversary, StraightOnesGetNearlyAllOfTheTime) {
+  std::mt19937_64 random(7);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  for (std::uint64_t i = 0; i < motions() / 10; ++i) {
+    const double gap = uniform(0.05, 0.4), speed = uniform(0.1, 1), cloth = uniform(0, 1), rate = uniform(0, 0.1),
+                 deviation = uniform(0, 0.02);
+    Step step;
+    for (const double z : {0.0, gap}) {
+      Body body;
+      body.name = z == 0 ? "arm" : "cloth";
+      body.self_collision = false;
+      body.topology = share(Topology::fromTriangles(3, {{0, 1, 2}}));
+      body.t0 = body.t1 = share(Positions{{0, 0, z}, {1, 0, z}, {0, 1, z}});
+      step.bodies.push_back(body);
+    }
+    step.stamp_ns = 1;
+    IntendedPath path;
+    path.bodies = {{0, {}}};
+    path.deviation_m = deviation;
+    path.deviation_rate_m_s = rate;
+    addPieces(
+        [&](double t) {
+          return std::vector<Eigen::Isometry3d>{Eigen::Isometry3d(Eigen::Translation3d(0, 0, speed * t))};
+        },
+        5, 0, 1, 1e-3, 20, path);
+    Options options;
+    options.clearance.wanted = true;
+    History history;
+    const Outcome outcome = detect(step, options, history);
+    PathSearch search;
+    const AlongPath along = search.run(outcome, options, {{SpeedBound::NONE}, {cloth}}, std::nullopt, path);
+    const double truth_s = (gap - deviation) / (speed + rate + cloth);
+    EXPECT_LE(along.until.seconds(), truth_s * (1 + 1e-12)) << i;
+    EXPECT_GE(along.until.seconds(), 0.97 * truth_s - 0.001) << i << " gap " << gap;
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

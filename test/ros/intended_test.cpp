@@ -1,0 +1,136 @@
+// ~intended of a live node: a motion of the robot's joints, one that is wrong, and an arm that leaves it.
+#include <deformable_ccd/AlongPath.h>
+#include <deformable_ccd/SafeUntil.h>
+#include <deformable_ccd/SpeedScale.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <rosgraph_msgs/Log.h>
+#include <tf2_msgs/TFMessage.h>
+#include <trajectory_msgs/JointTrajectory.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include "ros/support/live_tests.h"
+#include "ros/support/meshes.h"
+#include "ros/support/probe.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+using trajectory_msgs::JointTrajectory;
+
+/// A plate on a lift, 0.1 m above the nearest point of a tip, less half of its thickness, in frames at 20 Hz.
+struct Intended : ::testing::Test {
+  const std::string name = "/collision_monitor";
+  ros::NodeHandle node;
+  Probe<deformable_ccd::SafeUntil> promises{node, name + "/safe_until"};
+  Probe<deformable_ccd::AlongPath> paths{node, name + "/along_path"};
+  Probe<deformable_ccd::SpeedScale> scales{node, name + "/speed_scale"};
+  Probe<rosgraph_msgs::Log> lines{node, "/rosout"};
+  ros::Publisher intended = advertiseAndWait<JointTrajectory>(node, name + "/intended");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
+  ros::Publisher tip = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tip");
+  std::atomic<double> plate_m{0.1};
+  std::atomic<bool> ends{false};
+  std::thread frames{[this] {
+    for (; !ends; ros::WallDuration(0.05).sleep()) {
+      const deformable_ccd::MeshStamped mesh = meshStamped(tipAbove(0.3), ros::Time::now().toSec());
+      tf2_msgs::TFMessage message;
+      auto& one = message.transforms.emplace_back();
+      one.header.stamp = mesh.header.stamp;
+      one.header.frame_id = "world";
+      one.child_frame_id = "plate";
+      one.transform.translation.z = plate_m;
+      one.transform.rotation.w = 1;
+      tf.publish(message);
+      tip.publish(mesh);
+    }
+  }};
+  ~Intended() override {
+    ends = true;
+    frames.join();
+  }
+
+  static JointTrajectory holds() {
+    JointTrajectory message;
+    message.header.stamp = ros::Time::now();
+    message.joint_names = {"lift"};
+    message.points.resize(2);
+    for (auto& point : message.points) point.positions = {0.1};
+    message.points[1].time_from_start = ros::Duration(30);
+    return message;
+  }
+  /// By bounds alone, 0.1 and 0.5 m/s.
+  void expectBoundsAlone(const std::string& when) {
+    EXPECT_TRUE(waitUntil([&] { return paths.count() > 0 && !paths.last().used; })) << when;
+    EXPECT_TRUE(waitUntil([&] { return std::abs(promises.last().seconds - 0.099 / 0.6) < 1e-3; }))
+        << when << ": " << promises.last().seconds << " s " << promises.last().reason;
+    EXPECT_TRUE(waitUntil([&] { return scales.last().scale < 1; })) << when;
+  }
+  /// Until the tip, at 0.1 m/s, and the tube, of 0.01 m and 0.01 m/s, may meet.
+  void expectThePath(const std::string& when) {
+    EXPECT_TRUE(waitUntil([&] { return paths.last().used; })) << when << ": " << paths.last().reason;
+    EXPECT_TRUE(waitUntil([&] { return std::abs(promises.last().seconds - (0.099 - 0.01) / 0.11) < 1e-3; }))
+        << when << ": " << promises.last().seconds << " s " << promises.last().reason;
+    EXPECT_TRUE(waitUntil([&] { return scales.last().scale == 1; })) << when << ": " << scales.last().reason;
+  }
+  bool isSaid(const std::string& text) {
+    return waitUntil([&] {
+      const auto all = lines.all();
+      return std::any_of(all.begin(), all.end(), [&](const rosgraph_msgs::Log& line) {
+        return line.msg.find(name + "/intended: " + text) != std::string::npos;
+      });
+    });
+  }
+};
+
+TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
+  expectBoundsAlone("at first");
+  intended.publish(holds());
+  expectThePath("with a motion");
+  EXPECT_EQ(paths.last().bodies, std::vector<std::string>{"plate"});
+  EXPECT_NEAR(paths.last().ahead, 1, 0.1);
+  const auto assumed = promises.last().assumed;
+  EXPECT_TRUE(std::any_of(assumed.begin(), assumed.end(), [](const std::string& sentence) {
+    return sentence.find("'plate' go along the intended path") != std::string::npos;
+  }));
+
+  JointTrajectory wrong = holds();
+  wrong.joint_names = {"elbow"};
+  intended.publish(wrong);
+  EXPECT_TRUE(isSaid("joint_names[0] 'elbow' is no joint"));
+  expectBoundsAlone("after a joint that does not exist");
+  for (const auto& change : std::vector<std::function<void(JointTrajectory&)>>{
+           [](JointTrajectory& t) { t.points[1].positions = {std::nan("")}; },
+           [](JointTrajectory& t) { t.points[1].time_from_start = ros::Duration(0); },
+           [](JointTrajectory& t) { t.header.stamp -= ros::Duration(60); }}) {
+    intended.publish(holds());
+    expectThePath("once more");
+    wrong = holds();
+    change(wrong);
+    intended.publish(wrong);
+    expectBoundsAlone("after a mistake");
+  }
+
+  intended.publish(holds());
+  expectThePath("before the plate is elsewhere");
+  plate_m = 0.15;
+  EXPECT_TRUE(waitUntil([&] { return !paths.last().used; }));
+  EXPECT_TRUE(waitUntil([&] {
+    const auto all = promises.all();
+    return std::any_of(all.begin(), all.end(), [](const deformable_ccd::SafeUntil& said) {
+      return said.broken.find("m off the intended path") != std::string::npos;
+    });
+  }));
+  EXPECT_TRUE(waitUntil([&] { return std::abs(promises.last().seconds - 0.149 / 0.6) < 1e-3; }));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
+
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "intended_test"); }
