@@ -52,6 +52,7 @@ function(set_test_options name)
   set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
 endfunction()
 set_test_options(deformable_ccd_test_support)
+set_target_properties(deformable_ccd_test_support PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
 target_precompile_headers(deformable_ccd_test_support PRIVATE
   <gtest/gtest.h> <random> ${COMMON_HEADERS} <oracle/oracle.h> <dccd/stream.h>)
 
@@ -66,6 +67,7 @@ function(add_gtest_suite name)
   target_link_libraries(${name} PRIVATE deformable_ccd_test_support ${arg_LIBRARIES} GTest::gtest_main)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/gtest)
   set_test_options(${name})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
   if(NOT arg_HEADERS_OF)
     set(arg_HEADERS_OF deformable_ccd_test_support)
   endif()
@@ -92,6 +94,14 @@ if(TARGET deformable_ccd_python)
   add_test_tool(write_steps test/python/write_steps.cpp)
   set_target_properties(write_steps PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/gtest)
 endif()
+
+# These name what others of their suite name, too.
+set_source_files_properties(test/property/elementary_exact_test.cpp test/property/elementary_structured_test.cpp
+  test/property/safe_until_test.cpp test/property/step_detector_test.cpp test/unit/obstacle/obstacle_check_test.cpp
+  test/unit/obstacle/voxel_surface_test.cpp test/unit/octomap/cloud_map_test.cpp test/unit/report/look_ahead_score_test.cpp
+  test/unit/step/bodies_at_rest_test.cpp test/unit/step/clearance_test.cpp test/unit/step/history_test.cpp
+  test/unit/step/start_state_test.cpp test/unit/stream/mesh_store_test.cpp test/unit/stream/new_contacts_test.cpp
+  test/unit/stream/own_worlds_test.cpp test/unit/stream/reach_search_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
 # scripts/test reads this list: a suite that is on it but was not built counts as failed.
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "")
@@ -132,7 +142,6 @@ set_source_files_properties(test/unit/ros/include_order_core_first_test.cpp test
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES}
   LIBRARIES deformable_ccd_live_support deformable_ccd_ros ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
-set_target_properties(ros_tests PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
 # These six name what they write and read alike, or are about the order of headers.
 set_source_files_properties(test/unit/ros/hostile_input_test.cpp test/unit/ros/include_order_core_first_test.cpp
   test/unit/ros/include_order_messages_first_test.cpp test/unit/ros/mesh_decoder_test.cpp

@@ -94,8 +94,7 @@ class Witness {
     out["map_age_s"] = sorted(map_ages_);
     out["latency_ms"] = sorted(latencies_ms_);
     out["step_ms"] = sorted(steps_ms_);
-    out["clearance_ms"] = sorted(clearances_ms_);
-    out["own_voxels_ms"] = sorted(own_voxels_ms_);  // of steps that took a map
+    for (const auto& [name, ms] : stages_ms_) out["stages_ms"][name] = sorted(ms);  // own_voxels: the telling of a map, beside the steps
     out["reasons"] = reasons_;
     out["scale_reasons"] = scale_reasons_;
     out["last"] = last_;
@@ -111,7 +110,8 @@ class Witness {
   std::size_t answers_ = 0, proved_ = 0, touching_expected_ = 0, touching_else_ = 0;
   ros::Time newest_;
   std::set<ros::Time> map_stamps_;
-  std::vector<double> map_ages_, scales_, latencies_ms_, steps_ms_, clearances_ms_, own_voxels_ms_;
+  std::vector<double> map_ages_, scales_, latencies_ms_, steps_ms_;
+  std::map<std::string, std::vector<double>> stages_ms_;  // of the steps in which they took time
   std::map<std::string, std::size_t> reasons_, scale_reasons_;
   json last_;
 
@@ -166,8 +166,7 @@ class Witness {
     latencies_ms_.push_back(1e3 * m.latency);
     steps_ms_.push_back(m.total_ms);
     for (const auto& stage : m.stages) {
-      if (stage.name == "clearance") clearances_ms_.push_back(stage.ms);
-      if (stage.name == "own_voxels" && stage.ms > 0) own_voxels_ms_.push_back(stage.ms);
+      if (stage.ms > 0) stages_ms_[stage.name].push_back(stage.ms);
     }
     last_ = {{"frames_received", m.frames_received}, {"frames_processed", m.frames_processed},
              {"frames_skipped", m.frames_skipped},   {"maps_received", m.maps_received},

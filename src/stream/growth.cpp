@@ -3,34 +3,7 @@
 #include <algorithm>
 #include <unordered_set>
 
-#include "obstacle/leaf_sets.h"
-
 namespace dccd {
-namespace {
-
-/// The voxel and those around it, as far as there are keys.
-KeyBox around(const VoxelKey& key) {
-  const auto low = [](std::uint16_t k) { return std::max(0, k - 1); };
-  const auto high = [](std::uint16_t k) { return std::min(VoxelTree::KEYS - 1, k + 1); };
-  return {{low(key.x), low(key.y), low(key.z)}, {high(key.x), high(key.y), high(key.z)}};
-}
-
-/// Whether test(packed key) is true of the voxel or one around it; not asked on once it was.
-template <class Test>
-bool anyAround(const VoxelKey& key, const Test& test) {
-  const KeyBox box = around(key);
-  for (int x = box.lo[0]; x <= box.hi[0]; ++x) {
-    for (int y = box.lo[1]; y <= box.hi[1]; ++y) {
-      for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
-        if (test(packed({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(z)})))
-          return true;
-      }
-    }
-  }
-  return false;
-}
-
-}  // namespace
 
 void Growth::clear() {
   grown_.clear();

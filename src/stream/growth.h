@@ -1,6 +1,7 @@
 // What grows into a body's reach from outside: it began where no body was.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <limits>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "dccd/types.h"
+#include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_tree.h"
 
 namespace dccd {
@@ -52,6 +54,28 @@ inline std::uint64_t packed(const VoxelKey& key) {
 inline VoxelKey unpacked(std::uint64_t key) {
   return {static_cast<std::uint16_t>(key >> 32), static_cast<std::uint16_t>(key >> 16),
           static_cast<std::uint16_t>(key)};
+}
+
+/// The voxel and those around it, as far as there are keys.
+inline KeyBox around(const VoxelKey& key) {
+  const auto low = [](std::uint16_t k) { return std::max(0, k - 1); };
+  const auto high = [](std::uint16_t k) { return std::min(VoxelTree::KEYS - 1, k + 1); };
+  return {{low(key.x), low(key.y), low(key.z)}, {high(key.x), high(key.y), high(key.z)}};
+}
+
+/// Whether test(packed key) is true of the voxel or one around it; not asked on once it was.
+template <class Test>
+bool anyAround(const VoxelKey& key, const Test& test) {
+  const KeyBox box = around(key);
+  for (int x = box.lo[0]; x <= box.hi[0]; ++x) {
+    for (int y = box.lo[1]; y <= box.hi[1]; ++y) {
+      for (int z = box.lo[2]; z <= box.hi[2]; ++z) {
+        if (test(packed({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(z)})))
+          return true;
+      }
+    }
+  }
+  return false;
 }
 
 }  // namespace dccd

@@ -31,6 +31,7 @@ void OwnVoxelFinder::forget() {
   growth_.clear();
   remembered_.clear();
   seen_.clear();
+  seen_alone_.clear();
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
@@ -83,13 +84,24 @@ void OwnVoxelFinder::listChanges(Look& look) {
   }
 }
 
+void OwnVoxelFinder::seeAlone(const OccupiedLeaf& voxel, Look& look) {
+  const std::uint64_t key = packed(voxel.min);
+  look.seen_alone[key] = seen_alone_.count(key) > 0;
+  seen_.push_back(voxel);
+}
+
+bool OwnVoxelFinder::wasSeenAgain(const OccupiedLeaf& voxel) const {
+  const auto seen = seen_alone_.find(packed(voxel.min));
+  return seen != seen_alone_.end() && seen->second;
+}
+
 /// What is in doubt for the map's maker.
 void OwnVoxelFinder::listSeen(Look& look) {
   seen_.clear();
   if (!look.map.own.doubted_surface) return;
   const std::size_t most = look.cubes.size() + tolerance::MOST_OWN_ASKED;
   auto askSeen = [&](const OccupiedLeaf& voxel) {
-    if (!meets(voxel, look.region) || look.cubes.size() >= most) return seen_.push_back(voxel);
+    if (!meets(voxel, look.region) || look.cubes.size() >= most) return seeAlone(voxel, look);
     look.ask(voxel, ReachedCube::Why::SEEN);
   };
   for (const OccupiedLeaf& leaf : VoxelSurface::Impl::of(*look.map.own.doubted_surface).tree.leaves())
@@ -97,22 +109,23 @@ void OwnVoxelFinder::listSeen(Look& look) {
 }
 
 void OwnVoxelFinder::appear(const ReachedCube& cube, Look& look) {
-  const bool was_free =
-      look.change.has_before && !unseen_.holds(cube.leaf) && look.unknown.count(packed(cube.leaf.min)) == 0;
+  const bool was_seen = wasSeenAgain(cube.leaf);
+  const bool was_free = look.change.has_before && !was_seen && !unseen_.holds(cube.leaf) &&
+                        look.unknown.count(packed(cube.leaf.min)) == 0;
   const auto isNotYet = [&](int body) { return look.not_yet.count(body) > 0; };
   BodySet owners = look.ownersOf(cube);
   owners.removeIf(isNotYet);
   VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
   const bool on_trust = look.trust_first && !cube.near.empty() && (!was_free || isNotYet(*cube.near.begin()));
   if (on_trust) state = VoxelState::OWN;
-  if (was_free && state != VoxelState::OWN)
+  if ((was_free || was_seen) && state != VoxelState::OWN)
     growth_.add(cube.leaf, state == VoxelState::DOUBT, before_ns_, look.map.stamp_ns);
   if (state == VoxelState::OBSTACLE) return;
   if (owners.empty()) owners = cube.near;
   if (owners.empty()) {
     owners.add(static_cast<std::uint16_t>(look.seamed.empty() ? *look.lost.begin() : *look.seamed.begin()));
   }
-  look.appeared.push_back({cube.leaf.min, state, owners});
+  look.appeared.push_back({cube.leaf.min, state, owners, true, was_seen && state == VoxelState::DOUBT});
 }
 
 /// Says of a cube, by who reached it, what it is from now on.
@@ -128,7 +141,7 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
       return;
     }
     case ReachedCube::Why::SEEN:
-      if (cube.near.empty()) seen_.push_back(cube.leaf);
+      if (cube.near.empty() || wasSeenAgain(cube.leaf)) seeAlone(cube.leaf, look);
       return;
     case ReachedCube::Why::STATED:
       break;
@@ -169,7 +182,10 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
   std::sort(grew.begin(), grew.end());
   for (Stated& voxel : look.appeared) {
     const std::uint64_t key = packed(voxel.key);
-    if (std::binary_search(grew.begin(), grew.end(), key)) voxel.state = VoxelState::DOUBT;
+    if (std::binary_search(grew.begin(), grew.end(), key)) {
+      voxel.state = VoxelState::DOUBT;
+      voxel.grew = true;
+    }
     stated_[key] = voxel;
   }
 }
@@ -261,6 +277,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   askUnseen(look, there, ways_there);
   for (const ReachedCube& cube : look.cubes) follow(cube, look);
   remembered_ = std::move(look.hidden);
+  seen_alone_ = std::move(look.seen_alone);
   stateWhatAppeared(look, bodies, ways);
   unseen_.keep();
   if (before_ && look.is_gap) gap_ = gapBefore(map);

@@ -1,10 +1,11 @@
 // Which voxels of a map a tracked body accounts for: the sensor that made the map saw the body there, not an obstacle.
 // The rule is the table of stream/voxel_states.h, voxel by voxel from one map to the next. Beside it:
-// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h).
+// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h); so is, in that map, what is
+//   own and touches such a voxel: it may hold more of the same.
 // - A voxel of a map that is trusted (octomap_file) is an obstacle.
 // - Where a body is gone, nothing is its own any more.
 // - A voxel in which the map's maker has seen something, but not often enough for an obstacle, is in doubt, unless a
-//   body's surface was within own_voxels_m of it at that time.
+//   body's surface was within own_voxels_m of it at that time. Seen so in two maps it was not free.
 // What has no state here follows from the map before: what was occupied is an obstacle, what it showed as free is free,
 // and of what it left out nothing is known.
 #pragma once
@@ -61,7 +62,11 @@ class OwnVoxelFinder {
     VoxelState state;
     BodySet owners;     // of what is in doubt: who was near, for the sentence
     bool shown = true;  // the last map did
+    bool grew = false;  // it came from outside of every reach: own voxels beside it may hold more of it
   };
+  /// What a map's maker saw, not often enough for an obstacle, with nobody within reach: packed, and whether in more than one
+  /// map. One is a sensor's noise where a body comes next; what was seen again is there, whoever comes.
+  using SeenAlone = std::unordered_map<std::uint64_t, bool>;
   /// Of one map.
   struct Look;
   /// Bodies that were there, their ways up to it, and whether some other place of theirs was not known.
@@ -77,6 +82,8 @@ class OwnVoxelFinder {
   void findSeams(Look& look, const std::vector<TrackedBody>& bodies, double lag_s);
   void listChanges(Look& look);
   void listSeen(Look& look);
+  void seeAlone(const OccupiedLeaf& voxel, Look& look);
+  bool wasSeenAgain(const OccupiedLeaf& voxel) const;
   void appear(const ReachedCube& cube, Look& look);
   void follow(const ReachedCube& cube, Look& look);
   std::vector<OccupiedLeaf> unknownOf(std::vector<OccupiedLeaf> left_out, const Look& look) const;
@@ -104,6 +111,7 @@ class OwnVoxelFinder {
   std::set<std::uint16_t> known_;              // bodies whose way up to the last map was known
   RigidShapes shapes_;                         // of bodies that have been asked about
   std::vector<OccupiedLeaf> seen_;             // of the last map: in doubt for its maker
+  SeenAlone seen_alone_;                       // of the last map
   std::weak_ptr<const VoxelSurface> reduced_;  // of the map before, if it is still there
   std::uint64_t number_ = 0;                   // ObstacleMap::number of the last map
   std::string why_lost_;                       // why one was lost since it, as far as somebody said so

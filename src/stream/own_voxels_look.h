@@ -27,6 +27,7 @@ struct OwnVoxelFinder::Look {
   std::vector<Stated> appeared{};     // what is own or in doubt from now on
   std::unordered_set<std::uint64_t> unknown{};  // packed, of what appeared, and the map before left out
   std::vector<OccupiedLeaf> hidden{};           // obstacles, remembered from now on
+  SeenAlone seen_alone{};                       // from now on
 
   BodySet groupsOf(const BodySet& bodies) const {
     BodySet found;

@@ -18,7 +18,10 @@ sys.path.insert(0, str(CHECKOUT / 'benchmark'))
 
 @unittest.skipUnless((DATA / 'recordings').is_dir(), 'no %s: the recordings of others are not here' % (DATA / 'recordings'))
 class RecordingsTest(FolderTestCase):
-    def measured(self, *names, most=('--brute', '1')):
+    def measured(self, *names, most=('--brute', '1', '--audited', '40')):
+        """With --long the judge looks at all steps."""
+        if os.environ.get('DEFORMABLE_CCD_LONG') and '--audited' in most:
+            most = most[:most.index('--audited')]
         ran = run(sys.executable, SCRIPT, '--tools', TOOLS, '--data', DATA, '--out', self.folder, '--recordings', *names, *most)
         self.assertEqual(ran.returncode, 0, ran.stdout[-4000:] + ran.stderr[-4000:])
         rows = json.loads((self.folder / 'recordings.json').read_text())
@@ -56,7 +59,8 @@ class RecordingsTest(FolderTestCase):
 
     def test_a_captured_figure(self):
         row = self.measured('samba', most=('--brute', '0', '--audited', '1'))['samba']
-        self.assertEqual((row['steps'], row['proved'], row['claims']), (59, 59, 1))
+        self.assertEqual((row['steps'], row['proved']), (59, 59))
+        self.assertGreater(row['claims'], 0)
         self.assertGreater(row['contacts'], 1000)
 
     def test_a_real_camera(self):
@@ -65,7 +69,7 @@ class RecordingsTest(FolderTestCase):
         self.assertGreater(row['touching'], 3)
 
     def test_real_frames_real_maps_and_a_real_arm(self):
-        rows = self.measured('robot_tf', 'maps', 'ur5e', most=('--brute', '1', '--frames', '160'))
+        rows = self.measured('robot_tf', 'maps', 'ur5e', most=('--brute', '1', '--frames', '160', '--audited', '40'))
         self.assertEqual(set(rows), {'robot_tf', 'maps/fr_079', 'maps/geb079', 'ur5e'})
         for row in rows.values():
             self.assertEqual((row['steps'], row['proved']), (159, 159), row['recording'])

@@ -19,16 +19,16 @@ namespace dccd {
 namespace test {
 namespace {
 
-struct Touching {
+struct TouchingShapes {
   PairMotion pair;
   double toc;
 };
 
 /// Of every hard family, and as many as leave the last vector of a block half empty.
-std::vector<Touching> touchesOf(PairKind kind) {
+std::vector<TouchingShapes> touchesOf(PairKind kind) {
   RandomSource random(38);
   std::uniform_real_distribution<double> unit(0, 1);
-  std::vector<Touching> all;
+  std::vector<TouchingShapes> all;
   for (int h = 0; h < static_cast<int>(Hardness::COUNT); ++h) {
     for (int i = 0; i < 53; ++i) {
       const double toc = i % 4 == 0 ? 0 : i % 4 == 1 ? 1 : unit(random);
@@ -41,7 +41,7 @@ std::vector<Touching> touchesOf(PairKind kind) {
 Vec3 at(const PairMotion& pair, int vertex, int end) { return Eigen::Map<const Vec3>(pair.x[end][vertex]); }
 
 /// Point and normal as the step begins, without lanes.
-ContactGeometry placeOf(PairKind kind, const Touching& one) {
+ContactGeometry placeOf(PairKind kind, const TouchingShapes& one) {
   const auto along = [&](int v) {
     const Vec3 from = at(one.pair, v, 0), to = at(one.pair, v, 1);
     return one.toc == 0 ? from : Vec3(from + one.toc * (to - from));
@@ -66,7 +66,7 @@ bool isSame(double a, double b) { return (std::isnan(a) && std::isnan(b)) || std
 
 template <class Kernel, class Reference>
 void compare(PairKind kind, bool whole, const Kernel& kernel, const Reference& reference) {
-  const std::vector<Touching> touches = touchesOf(kind);
+  const std::vector<TouchingShapes> touches = touchesOf(kind);
   forEachTarget([&](const std::string& target) {
     for (std::size_t first = 0; first < touches.size(); first += simd::TOUCHES) {
       const std::size_t count = std::min(simd::TOUCHES, touches.size() - first);
@@ -101,7 +101,7 @@ TEST(TouchGeometry, PlacesAreThoseWithoutLanes) {
 }
 
 TEST(TouchGeometry, GeometryIsThatOfTheContact) {
-  const auto reference = [](PairKind kind, const Touching& one) { return contactGeometry(kind, one.pair, one.toc); };
+  const auto reference = [](PairKind kind, const TouchingShapes& one) { return contactGeometry(kind, one.pair, one.toc); };
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     compare(kind, true, simd::touchGeometry, reference);
   }

@@ -16,9 +16,9 @@ namespace dccd {
 namespace test {
 namespace {
 
-struct Draw {
+struct RandomWays {
   std::mt19937_64 random;
-  explicit Draw(std::uint64_t seed) : random(seed) {}
+  explicit RandomWays(std::uint64_t seed) : random(seed) {}
   double operator()(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random); }
   Vec3 vector(double size) { return {(*this)(-size, size), (*this)(-size, size), (*this)(-size, size)}; }
   Eigen::Isometry3d pose(double size, double angle) {
@@ -27,7 +27,7 @@ struct Draw {
 };
 
 /// A body of a few vertices that goes by up to seven waypoints, and turns or not.
-Body wander(Draw& draw, bool turns) {
+Body wander(RandomWays& draw, bool turns) {
   Body body = named("wanderer");
   body.turns = body.rigid = turns;
   body.topology = share(Topology::fromTriangles(5, {{0, 1, 2}, {2, 3, 4}}));
@@ -73,7 +73,7 @@ TEST(Waypoints, NoPathLeavesTheWayByMoreThanIsSaid) {
   double tightness = 0;
   int drawn = 0;
   for (std::uint64_t seed = 0; seed < 400; ++seed) {
-    Draw draw(seed);
+    RandomWays draw(seed);
     const Body body = wander(draw, seed % 2 == 0);
     const auto parts = static_cast<std::size_t>(draw(1, 20));
     const double n = static_cast<double>(parts), said = leavesWayBy(body, 1, parts);
@@ -95,7 +95,7 @@ TEST(Waypoints, NoPathLeavesTheWayByMoreThanIsSaid) {
 // advance() and placeVertex() have the body at the ends of parts where the way has it.
 TEST(Waypoints, PartsEndOnTheWay) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Draw draw(seed);
+    RandomWays draw(seed);
     Step step;
     step.bodies = {wander(draw, seed % 2 == 0)};
     Step at = step;
@@ -136,7 +136,7 @@ Outcome answer(const Step& step) {
 }
 
 TEST(Waypoints, WhatDipsBetweenTheEndsTouchesWhenItDoes) {
-  Draw draw(3);
+  RandomWays draw(3);
   int touched = 0, whole = 0;
   for (int i = 0; i < 500; ++i) {
     const int parts = 2 + i % 7, at = 1 + i % (parts - 1);
@@ -183,7 +183,7 @@ TEST(Waypoints, ThatNoNumberOfPartsFollowsAreNoWholeAnswer) {
 
 TEST(Waypoints, AreRecorded) {
   StepRecording recording{"", dip({{0.25, 0.5}, {0.5, -0.1}}), Options(), false, {}};
-  Draw draw(5);
+  RandomWays draw(5);
   recording.step.bodies.push_back(wander(draw, true));
   const std::vector<Body> bodies = again(recording).step.bodies;
   ASSERT_EQ(bodies[1].waypoints.size(), 2u);
