@@ -181,7 +181,7 @@ class ReportPageTest(FolderTestCase):
             page.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [{'name': 'prefers-color-scheme', 'value': scheme}]})
             return page.execute_async_script("""const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => { player.paint();
                 const c = document.getElementById('canvas'), g = c.getContext('webgl2') || c.getContext('webgl'), p = new Uint8Array(4);
-                g.readPixels(1, 1, 1, 1, g.RGBA, g.UNSIGNED_BYTE, p); done([...p]); }))""")[:3]
+                g.readPixels(1, c.height - 2, 1, 1, g.RGBA, g.UNSIGNED_BYTE, p); done([...p]); }))""")[:3]
         self.assertLess(max(corner('dark')), 64)
         self.assertGreater(min(corner('light')), 192)
 
