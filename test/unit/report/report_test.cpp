@@ -44,12 +44,14 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
   EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps; all of it proved.");
   EXPECT_EQ(headlineOf({no_map, no_map, nothingFound(StepStatus::PARTIAL, StartState::CLEAR)}),
             "No contact found in 3 answered steps; not proved: 3 of 3 frames: NO_MAP (2), PARTIAL (1).");
-  EXPECT_EQ(headlineOf({clear, no_map, crossing}),
-            "No contact found in 3 answered steps; surfaces touched from the start of a step (1 step: start INTERSECTING); "
-            "not proved: 1 of 3 frames: NO_MAP (1).");
-  EXPECT_EQ(headlineOf({clear, crossing}),
-            "No contact found in 2 answered steps; surfaces touched from the start of a step (1 step: start INTERSECTING); "
-            "all of it proved.");
+  EXPECT_EQ(
+      headlineOf({clear, no_map, crossing}),
+      "No contact found in 3 answered steps; surfaces touched from the start of a step (1 step: start INTERSECTING); "
+      "not proved: 1 of 3 frames: NO_MAP (1).");
+  EXPECT_EQ(
+      headlineOf({clear, crossing}),
+      "No contact found in 2 answered steps; surfaces touched from the start of a step (1 step: start INTERSECTING); "
+      "all of it proved.");
   EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered step; all of it proved.")
       << "of a first frame nothing is asked";
   EXPECT_EQ(headlineOf({Outcome{}, clear, lost, clear}),
