@@ -41,6 +41,7 @@ TEST(Map, OneThatIsOccupiedAlongABodyFromTheFirstStepOnIsDoubted) {
            {"own_voxels_m: auto", -0.05f, -0.05f, 0, {}},  // which has doubts of its own
            {"against_obstacle: false", -0.05f, -0.05f, 0, {}},
            {"expected_contacts: [{between: [mesh, octomap]}]", -0.05f, -0.05f, 0, {}},
+           {"octomap_file: box.bt", -0.05f, -0.05f, 0, {}},
        }) {
     Driven driven(scene(one.parameters));
     driven.giveMap(1);
