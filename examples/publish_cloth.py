@@ -7,7 +7,9 @@ import struct
 import time
 
 import rospy
+from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import PointCloud2, PointField
+from tf2_msgs.msg import TFMessage
 
 ROWS, COLS, APART_M, BOX_M, TOP_M = 20, 30, 0.02, 0.2, 0.4
 
@@ -22,6 +24,11 @@ def point(row, col, t):
 
 
 rospy.init_node('publish_cloth')
+# RViz warns until tf knows its fixed frame.
+box = TransformStamped(child_frame_id='box')
+box.header.frame_id, box.transform.rotation.w = 'world', 1
+tf = rospy.Publisher('/tf_static', TFMessage, queue_size=1, latch=True)
+tf.publish(TFMessage([box]))
 publisher = rospy.Publisher('/tracker/cloth', PointCloud2, queue_size=3)
 cloud = PointCloud2(height=1, width=ROWS * COLS, point_step=12, row_step=12 * ROWS * COLS)
 cloud.header.frame_id, cloud.fields = 'world', [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate('xyz')]

@@ -244,13 +244,13 @@ std::vector<std::string> ParameterReader::names() const {
   return result;
 }
 
-/// One of that very name in a section below, else the nearest at this level.
+/// One of that very name in a section below, else elsewhere, else the nearest at this level.
 std::string ParameterReader::nearestTo(const std::string& name) const {
-  const std::string ending = "/" + name;
-  for (const std::string& full : *all_known_) {
-    const bool ends =
-        full.size() >= ending.size() && full.compare(full.size() - ending.size(), ending.size(), ending) == 0;
-    if (ends && full.compare(0, path_.size(), path_) == 0) return full;
+  for (const std::string& where : {path_, std::string()}) {
+    for (const std::string& full : *all_known_) {
+      const std::size_t begin = full.find_last_of("~/") + 1;  // 0 where there is neither
+      if (full.compare(begin, std::string::npos, name) == 0 && full.compare(0, where.size(), where) == 0) return full;
+    }
   }
   return path_ + nearestName(name, std::vector<std::string>(known_.begin(), known_.end()));
 }

@@ -68,8 +68,9 @@ void MonitorLog::tell(const Outcome& outcome, const Statement& said) {
   }
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
   if (said.is_doubts_fault) return complain(config_.monitor.clock_body, "doubt", said.doubts.front());
-  const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
-                           (said.hint.empty() ? "" : "; " + said.hint);
+  // A long reason is cut, and never what is to be done.
+  const std::string what = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason);
+  const std::string text = joined(shortText(what, MAX_TEXT / 2), said.hint);
   if (lacksWhatMayCome(outcome) && waits(text)) return;
   if (outcome.status != StepStatus::TIME_JUMP) {
     return complain(config_.monitor.clock_body, toString(outcome.status), text);

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/contact_fields.h"
 #include "input/short_text.h"
 #include "input/transforms.h"
 #include "node/liveness.h"
@@ -386,13 +387,19 @@ void MonitorPipeline::doubtFirstMap(const Outcome& outcome) {
     const Body& body = outcome.step->bodies[b];
     if (map_doubts_[b] || !meetsMap(body)) continue;
     std::string& doubt = map_doubts_[b].emplace();
-    // Own voxels are looked for already, or cannot be.
-    if (ownsVoxels(body) || config_.unknown_space == UnknownSpace::OCCUPIED) continue;
+    // Own voxels are looked for already, or cannot be; a file's are nobody's.
+    if (ownsVoxels(body) || config_.takesMapFileAlone() || config_.unknown_space == UnknownSpace::OCCUPIED) continue;
     std::set<Index> occupied;
+    const auto isMet = [b](const std::array<std::uint16_t, 2>& pair, bool expected) {
+      return !expected && pair == std::array<std::uint16_t, 2>{static_cast<std::uint16_t>(b), OBSTACLE_BODY};
+    };
     for (const StartIntersection& one : outcome.intersections) {
-      if (one.body == std::array<std::uint16_t, 2>{static_cast<std::uint16_t>(b), OBSTACLE_BODY}) {
-        occupied.insert(one.vertex[0]);
-      }
+      if (isMet(one.body, one.expected)) occupied.insert(one.vertex[0]);
+    }
+    // Noise has half of the vertices beside the voxels that hold them; their edges and faces meet those.
+    for (const Contact& one : outcome.contacts) {
+      if (!one.initial || !isMet(one.body, one.expected)) continue;
+      forContactVertices(one, [&](std::uint16_t, Index v) { occupied.insert(v); });
     }
     if (occupied.empty() || 2 * occupied.size() < body.topology->vertexCount()) continue;
     doubt = "the map was occupied where '" + body.name + "' was: does it hold '" + body.name +

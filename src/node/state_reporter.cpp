@@ -182,7 +182,7 @@ void StateReporter::say(bool always) {
   if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
   Statement statement = answer_;
   statement.assurance.hinder(sentences);
-  statement.hint = joined(statement.hint, hint_);
+  if (!statement.is_doubts_fault) statement.hint = joined(statement.hint, hint_);
   // What is published as an object wakes roscpp's thread only where somebody listens: that thread takes locks, and
   // perhaps the core, from the worker, which has yet to publish the contacts.
   const auto message = boost::make_shared<deformable_ccd::State>(told_);

@@ -96,7 +96,7 @@ std::string AccuracyStudy::sentence() const {
   if (!best) return "Nothing that was tried saves a tenth of the time.";
   const FirstErrors& patches = best->errors.patches;
   std::ostringstream text;
-  text << best->varied << ' ' << best->setting << ": " << twoDigits(100 * shareOfTime(*best)) << " % of the time, ";
+  text << best->varied << ' ' << best->setting << ": " << twoDigits(1 / shareOfTime(*best)) << " times as fast, ";
   if (wrong(*best) == 0) {
     text << "no patch of " << patches.touched << " missed or invented";
   } else {

@@ -2,7 +2,7 @@
 const SPAN = (() => { const t = R.steps.map(s => s.t), low = Math.min(0, ...t.slice(0, 1)), high = t.length ? t[t.length - 1] : 1;
   return [low, Math.max(high, low + 1e-9)]; })();
 // When something began, over the whole run.
-const byTime = t => early(Math.min(1, Math.max(0, (t - SPAN[0]) / (SPAN[1] - SPAN[0]))));
+const byTime = t => inRun(Math.min(1, Math.max(0, (t - SPAN[0]) / (SPAN[1] - SPAN[0]))));
 const EVENT_COLOUR = { BEGAN: '#1b7f5c', ENDED: '#5b6b7d', SPLIT: '#7a4fb5', MERGED: '#7a4fb5', UNEXPECTED: '#d0021b' };
 const EVENT_WORD = { BEGAN: 'began', ENDED: 'ended', SPLIT: 'split', MERGED: 'merged', UNEXPECTED: 'is no longer expected' };
 const lanes = { seek: () => {}, cursor: () => {} };

@@ -69,8 +69,7 @@ document.getElementById('headline').textContent = R.headline;
 // What a reader is to know first: what is proved, what was looked at, what touched when. firsts: click to go there.
 { const card = (kind, title, ...lines) => { const d = document.getElementById('verdict').appendChild(document.createElement('div'));
     d.className = kind; d.appendChild(document.createElement('strong')).textContent = title;
-    lines.forEach(([text, t]) => { const p = d.appendChild(document.createElement('p')); p.textContent = text; p.title = text;
-      if (text.length > 260) p.textContent = text.slice(0, 250) + '…';
+    lines.forEach(([text, t]) => { const p = d.appendChild(document.createElement('p')); p.textContent = text;
       if (t !== undefined) { p.dataset.t = t; p.addEventListener('click', () => lanes.seek(t)); } }); };
   const P = R.proof, steps = n => n + (n === 1 ? ' step' : ' steps'), fact = (R.facts.find(([name]) => name === 'octomap') || ['', ''])[1];
   if (P.doubts.length) card('doubt', 'In doubt', ...P.doubts.map(text => [text]));
@@ -97,9 +96,15 @@ document.getElementById('headline').textContent = R.headline;
     const top = a.y(Math.min(n, s.contacts));
     if (n && s.contacts) el('title', {}, el('rect', { x: a.x(s.t) - a.bar / 2, y: top, width: a.bar, height: a.y(0) - top, fill }, a.svg),
       `step ${s.step}: ${s.contacts} contacts, ${s.undecided} undecided, ${s.initial} initial`); })); }
-{ const a = axes('latency', 180, Math.max(1e-3, ...R.steps.map(s => s.ms)), 'ms');
-  el('polyline', { points: R.steps.filter(s => s.answered).map(s => `${a.x(s.t)},${a.y(s.ms)}`).join(' '), fill: 'none',
+{ const longest = Math.max(1e-3, ...R.steps.map(s => s.ms)), usual = 2 * R.total.p95_ms;
+  // One long step is not to flatten all others: it is cut, and its number written.
+  const most = longest > 2 * usual && usual > 0 ? usual : longest, answered = R.steps.filter(s => s.answered), cut = answered.filter(s => s.ms > most);
+  const a = axes('latency', 180, most, 'ms');
+  el('polyline', { points: answered.map(s => `${a.x(s.t)},${a.y(Math.min(s.ms, most))}`).join(' '), fill: 'none',
     stroke: '#2a6fb0', 'stroke-width': 1.3 }, a.svg);
+  let free = -Infinity;
+  cut.forEach(s => { if (a.x(s.t) < free) return; free = a.x(s.t) + 50;
+    el('text', { class: 'cut', x: a.x(s.t) + 3, y: TOP + 10, 'font-size': 11, fill: '#556' }, a.svg, short(s.ms)); });
   el('line', { x1: LEFT, x2: W - RIGHT, y1: a.y(R.total.median_ms), y2: a.y(R.total.median_ms), stroke: '#f0a030' }, a.svg);
   document.getElementById('latency_note').textContent = `Median ${number(R.total.median_ms)} ms (orange line), 95 % below ` +
     `${number(R.total.p95_ms)} ms, 99 % below ${number(R.total.p99_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
@@ -156,11 +161,11 @@ function frontPlot(id, all, xlabel, ylabel, least) {
     taken.push([from, cy, end]); label(cx + (left ? -13 : 13), cy - (front.includes(p) ? 4 : -4), p.name, left ? { 'text-anchor': 'end' } : {}); });
 }
 
-const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
-const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
-  return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
-// Of times: early red, late pale, as in RViz.
-const early = f => colour(1 - f), EARLY_TO_LATE = 'linear-gradient(to right,' + [1, .5, 0].map(colour).join(',') + ')';
+// Of times, 0 to 1, early dark and late pale: red within a step, as in RViz, blue within the run.
+const ramp = stops => f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
+  return 'rgb(' + stops[i].map((c, k) => Math.round(c + w * (stops[i + 1][k] - c))).join(',') + ')'; };
+const early = ramp([[183, 28, 28], [251, 140, 60], [255, 236, 179]]), inRun = ramp([[10, 60, 95], [50, 145, 165], [180, 222, 215]]);
+const gradient = times => 'linear-gradient(to right,' + [0, .5, 1].map(times).join(',') + ')';
 table('touched', ['body', 'vertices', 'touched at some time', 'most often', 'first touch [s]'], R.bodies.map(b => [
   b.name, b.count.length, b.count.filter(n => n).length, b.count.reduce((most, n) => Math.max(most, n), 0),
   b.first.reduce((least, t) => least === null || (t !== null && t < least) ? t : least, null)]));

@@ -38,7 +38,8 @@ const player = (() => {
     return null;
   }
   view.hidden = get('controls').hidden = get('listing').hidden = false;
-  renderer.setClearColor(0x20262e);
+  const scheme = window.matchMedia('(prefers-color-scheme: dark)'), ground = () => renderer.setClearColor(getComputedStyle(view).backgroundColor);
+  ground(); scheme.addEventListener('change', () => { ground(); draw(); });
   const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(40, 16 / 9, 0.001, 1000);
   camera.up.set(0, 0, 1);
   scene.add(new THREE.AmbientLight(0xffffff, 0.55));
@@ -135,8 +136,9 @@ const player = (() => {
 
   // Points on top of everything: discs for contacts, rings for patches.
   const sprite = ring => { const c = document.createElement('canvas'), g = c.getContext('2d'); c.width = c.height = 64;
-    g.beginPath(); g.arc(32, 32, ring ? 24 : 26, 0, 7); g.lineWidth = ring ? 10 : 6;
-    g.fillStyle = '#fff'; if (!ring) g.fill(); g.strokeStyle = ring ? '#fff' : '#10151b'; g.stroke();
+    g.beginPath(); g.arc(32, 32, ring ? 24 : 26, 0, 7); g.lineWidth = ring ? 14 : 6;
+    g.fillStyle = '#fff'; if (!ring) g.fill(); g.strokeStyle = '#10151b'; g.stroke();
+    if (ring) { g.lineWidth = 8; g.strokeStyle = '#fff'; g.stroke(); }
     return new THREE.CanvasTexture(c); };
   const dots = (ring, size) => { const p = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size, sizeAttenuation: false,
     map: sprite(ring), vertexColors: THREE.VertexColors || true, transparent: true, depthTest: false, depthWrite: false }));
@@ -303,14 +305,14 @@ const player = (() => {
   window.addEventListener('resize', resize);
   resize(); fit();
   const legend = get('legend');
-  { const p = legend.appendChild(document.createElement('span')), bar = document.createElement('span');
-    bar.className = 'scale'; bar.style.background = EARLY_TO_LATE; p.append('early', bar, 'late: ● a contact within its step, ○ a patch within the run'); }
-  legend.appendChild(document.createElement('span')).textContent = 'grey: expected';
-  const swatch = (colour, text) => { const p = legend.appendChild(document.createElement('span')), i = p.appendChild(document.createElement('i'));
-    i.style.background = '#' + colour.toString(16).padStart(6, '0'); p.append(text); };
+  const item = (...parts) => { const li = legend.appendChild(document.createElement('li')); li.append(...parts); return li; };
+  [['● contact, within its step: early', early], ['○ patch, within the run: early', inRun]].forEach(([text, times]) => { const bar = document.createElement('span');
+    bar.className = 'scale'; bar.style.background = gradient(times); item(text, bar, 'late'); });
+  item('● ○ grey: expected');
+  const swatch = (colour, text) => { const i = document.createElement('i'); i.style.background = '#' + colour.toString(16).padStart(6, '0'); item(i, text); };
   const NAMED = 8;  // a robot has many links
   shown.slice(0, NAMED).forEach(s => swatch(s.colour, s.body.name));
-  if (shown.length > NAMED) legend.appendChild(document.createElement('span')).textContent = `and ${shown.length - NAMED} more bodies`;
+  if (shown.length > NAMED) item(`and ${shown.length - NAMED} more bodies`);
   if (D.maps.some(m => m.own)) swatch(OWN, "a body's own voxels, no obstacle");
   if (D.maps.some(m => m.doubted)) swatch(DOUBTED, "voxels in doubt, a body's or an obstacle's");
   note.textContent = (frames.length < D.seen ? `${frames.length} of ${D.seen} recorded frames are kept, those with events of patches first: what is between is not shown. ` :

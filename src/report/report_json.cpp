@@ -77,7 +77,7 @@ std::string Report::headline(bool reasons) const {
   if (with_expected_ > 0) text << "; expected contacts in " << with_expected_ << " of them";
   const char* separator = "; surfaces touched from the start of a step (";
   for (const auto& [what, steps] : lasting_) {
-    text << separator << what << ' ' << steps;
+    text << separator << steps << (steps == 1 ? " step: " : " steps: ") << what;
     separator = ", ";
   }
   if (!lasting_.empty()) text << ')';

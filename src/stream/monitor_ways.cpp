@@ -75,7 +75,10 @@ bool hasLost(const MeshFrame& frame, const Body& body) {
   });
 }
 
-void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
+/// Once: both ends of a step may say the same.
+void addSentence(std::string& text, const std::string& sentence) {
+  if (text.find(sentence) == std::string::npos) text += (text.empty() ? "" : "; ") + sentence;
+}
 
 }  // namespace
 

@@ -104,6 +104,12 @@ class LaunchTest(unittest.TestCase):
                 self.assertLessEqual({'mesh:=/mine', 'octomap_binary:=/my_map'}, self.words(launch, *arguments))
                 self.assertEqual({type(found[name]) for name in ('step_budget_ms', 'look_ahead_s')}, {float})
 
+    def test_rviz_draws_bodies_and_map(self):
+        """An empty view looks like a monitor that does not run."""
+        found = self.parameters('monitor.launch', 'rviz:=true')
+        self.assertEqual((found['markers/mesh'], found['markers/obstacle_m']), (True, 0.1))
+        self.assertEqual(self.parameters('monitor.launch')['markers/mesh'], False)
+
     def test_a_topic_for_the_map_wins_over_its_file(self):
         found = self.parameters('monitor.launch', self.file(EVERYTHING), 'octomap:=/my_map')
         self.assertEqual((found['octomap_topic'], found['octomap_file']), ('octomap_binary', ''))

@@ -176,6 +176,15 @@ class ReportPageTest(FolderTestCase):
         ActionChains(page).drag_and_drop_by_offset(page.find_element('id', 'canvas'), 150, 20).perform()
         self.assertNotEqual(later, picture())
 
+        # Beside the bodies it has the page's own colour, in either scheme.
+        def corner(scheme):
+            page.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [{'name': 'prefers-color-scheme', 'value': scheme}]})
+            return page.execute_async_script("""const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => { player.paint();
+                const c = document.getElementById('canvas'), g = c.getContext('webgl2') || c.getContext('webgl'), p = new Uint8Array(4);
+                g.readPixels(1, c.height - 2, 1, 1, g.RGBA, g.UNSIGNED_BYTE, p); done([...p]); }))""")[:3]
+        self.assertLess(max(corner('dark')), 64)
+        self.assertGreater(min(corner('light')), 192)
+
         # Step by step, and playing to a pause.
         before = page.execute_script('return player.time()')
         page.find_element('id', 'on').click()
@@ -205,6 +214,24 @@ class ReportPageTest(FolderTestCase):
         self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
+    def test_one_long_step_does_not_flatten_the_others_and_no_cure_is_cut(self):
+        before, data, after = re.split(r'(?<=const R = )(.*?)(?=;\n)', self.page.read_text(), maxsplit=1, flags=re.S)
+        run_data = json.loads(data)
+        usual = 2 * run_data['total']['p95_ms']
+        run_data['steps'][30]['ms'] = 1000 * usual
+        run_data['proof'].update(unproved='why not, ' * 200 + 'and what to do', proved=0)
+        self.page = self.own / 'report.html'
+        self.page.write_text(before + json.dumps(run_data).replace('<', '\\u003c') + after)
+        body, console = self.dom()
+        self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
+        self.assertIn('and what to do</p>', body[body.index('id="verdict"'):body.index('id="player"')])
+        plot = body[body.index('id="latency"'):].split('</svg>')[0]
+        self.assertEqual(len(re.findall(r'class="cut"', plot)), 1)
+        heights = [float(y) for y in re.findall(r',([\d.]+)', re.search(r'<polyline points="([^"]*)', plot)[1])]
+        self.assertEqual(heights.count(min(heights)), 1)
+        self.assertGreater(max(heights) - sorted(heights)[1], 20, 'pixels between the others')
+
+    @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_how_close(self):
         """A curve a bound of each two partners."""
         self.changed(lambda page: page['monitor'].update(effects={**page['monitor'].get('effects', {}), 'clearance': 'on'}, max_speed_m_s=2))
@@ -228,6 +255,9 @@ class ReportPageTest(FolderTestCase):
         body, console = self.dom()
         self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
         if 'without three.js' not in body:
+            legend = body[body.index('<ul id="legend">'):].split('</ul>')[0]
+            self.assertRegex(legend, r'<li>● contact, within its step: early<span.*<li>○ patch, within the run: early<span.*<li>.*cloth</li>')
+            self.assertEqual(len(set(re.findall(r'linear-gradient[^;]*;', legend))), 2, 'a bar has one meaning')
             self.assertIn("a body's own voxels", body)
             self.assertIn('voxels in doubt', body)
 

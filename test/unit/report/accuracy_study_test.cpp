@@ -228,13 +228,13 @@ TEST(AccuracyStudy, TheSentenceIsOfTheFastestThatLosesNothing) {
   EXPECT_EQ(study.sentence(), "Nothing that was tried saves a tenth of the time.");
   study.add("frames", "every 8th", wrong);
   EXPECT_EQ(study.sentence(),
-            "frames every 8th: 4.0 % of the time, 1 of 1 patches missed and 0 invented; nothing that was tried saves a "
+            "frames every 8th: 25 times as fast, 1 of 1 patches missed and 0 invented; nothing that was tried saves a "
             "tenth of the time and gets all of them right.");
   study.add("frames", "every 2nd", half);
   study.add("step budget", "0.1 ms", budget, true);
   EXPECT_EQ(
       study.sentence(),
-      "frames every 2nd: 46 % of the time, no patch of 1 missed or invented, first contacts up to 8.0 ms late (95 "
+      "frames every 2nd: 2.2 times as fast, no patch of 1 missed or invented, first contacts up to 8.0 ms late (95 "
       "% within 8.0 ms).")
       << "46 % of the mean of 2 and 3 ms";
   EXPECT_EQ(AccuracyStudy(run()).sentence(),

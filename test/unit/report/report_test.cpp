@@ -44,12 +44,14 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
   EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps; all of it proved.");
   EXPECT_EQ(headlineOf({no_map, no_map, nothingFound(StepStatus::PARTIAL, StartState::CLEAR)}),
             "No contact found in 3 answered steps; not proved: 3 of 3 frames: NO_MAP (2), PARTIAL (1).");
-  EXPECT_EQ(headlineOf({clear, no_map, crossing}),
-            "No contact found in 3 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
-            "not proved: 1 of 3 frames: NO_MAP (1).");
-  EXPECT_EQ(headlineOf({clear, crossing}),
-            "No contact found in 2 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
-            "all of it proved.");
+  EXPECT_EQ(
+      headlineOf({clear, no_map, crossing}),
+      "No contact found in 3 answered steps; surfaces touched from the start of a step (1 step: start INTERSECTING); "
+      "not proved: 1 of 3 frames: NO_MAP (1).");
+  EXPECT_EQ(
+      headlineOf({clear, crossing}),
+      "No contact found in 2 answered steps; surfaces touched from the start of a step (1 step: start INTERSECTING); "
+      "all of it proved.");
   EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered step; all of it proved.")
       << "of a first frame nothing is asked";
   EXPECT_EQ(headlineOf({Outcome{}, clear, lost, clear}),
@@ -91,9 +93,9 @@ TEST(Headline, WhatLiesInsideOfWhatIsNamed) {
   inside.intersections[1] = inside.intersections[0];
   inside.intersections[1].vertex[0] = 4;
   EXPECT_EQ(headlineOf({inside}),
-            "No contact found in 1 answered step; surfaces touched from the start of a step (rope lies inside of box, "
-            "which is 400 m across: rigid/scale: 0.001 if its file is in millimetres, shell: true if it is a container "
-            "1); all of it proved.");
+            "No contact found in 1 answered step; surfaces touched from the start of a step (1 step: rope lies inside "
+            "of box, which is 400 m across: rigid/scale: 0.001 if its file is in millimetres, shell: true if it is a "
+            "container); all of it proved.");
 }
 
 TEST(Headline, WhatWasNotLookedAtStandsBesideWhatWasFound) {

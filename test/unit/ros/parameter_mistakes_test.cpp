@@ -20,6 +20,7 @@ TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
       {"sensor_model: {mis: 0.3}", "~sensor_model/mis is not known; nearest is ~sensor_model/miss"},
       {"clearance: {max: 1.0}", "~clearance/max is not known; nearest is ~clearance/max_m"},
       {"rows: 20", "~rows is not known; nearest is ~topology/rows"},
+      {"bodies: {cloth: {look_ahead_s: 1}}", "~bodies/cloth/look_ahead_s is not known; nearest is ~look_ahead_s"},
       {"bodies: {cloth: {topic: a, cols: 3}}",
        "~bodies/cloth/cols is not known; nearest is ~bodies/cloth/topology/cols"},
   });
