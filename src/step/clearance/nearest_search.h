@@ -82,7 +82,7 @@ class NearestSearch {
       }
       Pair pair = take();
       const bool is_done = prunes(pair.squared);  // nothing else is nearer
-      if (is_done || isLate()) {
+      if (is_done || (plane_ > 0 ? isOver() : isLate())) {  // boxes along a plane take long
         found_.cut = found_.cut || !is_done;
         settleSquared(pair.squared);
         break;
@@ -459,6 +459,7 @@ class NearestSearch {
     double apart_m = goal_.at_end ? apart_m_[1] : std::min(apart_m_[0], apart_m_[1]);
     if (apart_m - slack_m_ < enough_m_) return false;
     if (!goal_.at_end) {
+      if (isOver()) return false;
       const Turning against{-n[0], -n[1]};
       apart_m = std::min(apart_m, -furthest(a, against, Reach::MIDDLE).reach_m - furthest(b, n, Reach::MIDDLE).reach_m);
     }
