@@ -92,9 +92,8 @@ struct Asked {
     double most_ms = 0;
     for (const Step& way : ways) detect(way, options, history);
     for (int i = 0; i < CUT_STEPS; ++i) {
-      most_ms = std::max(most_ms, overrunMs(BUDGET_MS, [&] {
-                           detect(ways[i % 2], options, history, Deadline::after(BUDGET_MS));
-                         }));
+      most_ms = std::max(
+          most_ms, overrunMs(BUDGET_MS, [&] { detect(ways[i % 2], options, history, Deadline::after(BUDGET_MS)); }));
     }
     return most_ms;
   }
@@ -196,11 +195,10 @@ std::vector<Row> knownRows() {
   Scene tiny = flat, small = flat;
   tiny.replaced = {0, 1e-300};
   small.replaced = {0, 1e-200};
-  rows.push_back(
-      {"sheets crossing, coordinates in {0, 1e-300}",
-       3,
-       false,
-       {asked("1e-300", tiny), asked("1e-200", small), asked("0 alone", flat)}});
+  rows.push_back({"sheets crossing, coordinates in {0, 1e-300}",
+                  3,
+                  false,
+                  {asked("1e-300", tiny), asked("1e-200", small), asked("0 alone", flat)}});
   Scene denormal;
   denormal.shape.fill(test::sheet(20, 1));
   denormal.scale = 1e-310;

@@ -17,10 +17,6 @@ namespace {
 // how much of it the scene must fill, since the wider the range, the coarser the bounds (of 65,528 values a direction).
 constexpr double PADDING = tolerance::RECORD_PADDING, SMALLEST_SHARE = tolerance::RECORD_SHARE;
 
-// Largest coordinates [m] of a scene whose vertices are taken as they are. Beyond, filters tell less and less: of edges
-// a thousand times smaller products underflow in floats, and differences come to tolerance::FUSED_LARGEST_M.
-constexpr double SMALLEST_M = 0x1p-20, LARGEST_M = 0x1p28;
-
 constexpr std::size_t PIECE = 2048;  // vertices that are recorded in one go
 
 // a - b as an unevaluated sum without error (Knuth's two-sum); not finite when it overflows.
@@ -338,9 +334,9 @@ void SceneArrays::endRecord(bool any_kept, bool may_scale) {
   }
 }
 
-/// Filters compute in floats, products of many coordinates in doubles: of scenes far from 1 m they could tell nothing. A
-/// contact and its time stay the same where all coordinates are multiplied by one number, and by a power of two none is
-/// rounded, unless it becomes denormal. Nothing of such a step is kept for the next.
+/// Filters compute in floats, products of many coordinates in doubles: of scenes far from 1 m they could tell nothing.
+/// A contact and its time stay the same where all coordinates are multiplied by one number, and by a power of two none
+/// is rounded, unless it becomes denormal. Nothing of such a step is kept for the next.
 bool SceneArrays::scaleVertices() {
   double largest = 0;
   for (const SceneBody& body : bodies_) {
@@ -350,7 +346,7 @@ bool SceneArrays::scaleVertices() {
     }
     if (body.reach_m > 0) return false;
   }
-  const bool fits = largest >= SMALLEST_M && largest <= LARGEST_M;
+  const bool fits = largest >= tolerance::SCENE_SMALLEST_M && largest <= tolerance::SCENE_LARGEST_M;
   if (uncertain_ || fits || largest == 0) return false;
   const int up = -std::ilogb(largest);
   const auto forEach = [&](const auto& f) {

@@ -56,7 +56,8 @@ Factor interpolate(const DoubleDouble& d0, const DoubleDouble& d1, double s, con
 int lowestBitOf(double x) {
   int exponent;
   const auto bits = static_cast<std::int64_t>(std::ldexp(std::frexp(x, &exponent), 53));
-  return bits == 0 ? std::numeric_limits<int>::max() : exponent - 53 + __builtin_ctzll(static_cast<std::uint64_t>(bits));
+  return bits == 0 ? std::numeric_limits<int>::max()
+                   : exponent - 53 + __builtin_ctzll(static_cast<std::uint64_t>(bits));
 }
 
 /// a b - c d.
@@ -124,9 +125,9 @@ int CoplanarityCubic::signAt(double t) const {
 }
 
 /// Each axis is multiplied by a power of two of its own, which multiplies f, so that its largest difference is about
-/// 2^LARGEST and f below 2^(3 LARGEST + 10). All terms are multiples of the product of the lowest bits on the three axes,
-/// t and 1-t being multiples of 2^-52: none underflows where that is representable, and where those of one axis or two
-/// are.
+/// 2^LARGEST and f below 2^(3 LARGEST + 10). All terms are multiples of the product of the lowest bits on the three
+/// axes, t and 1-t being multiples of 2^-52: none underflows where that is representable, and where those of one axis
+/// or two are.
 int CoplanarityCubic::exactSignAt(double t) const {
   constexpr int LARGEST = 300, LOWEST = -1074;
   if (!std::isfinite(error_)) return 0;
@@ -199,7 +200,7 @@ struct Tangent {
 }  // namespace
 
 std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits) {
-  constexpr int MOST_STEPS = 16;  // Newton's; from the batched tier's brackets one or two suffice
+  constexpr int MOST_STEPS = 16;       // Newton's; from the batched tier's brackets one or two suffice
   constexpr int MOST_EXACT_SIGNS = 2;  // later ones would take longer than integers do
   constexpr double GRID = tolerance::TIME_GRID;
   const double cells = std::ldexp(1.0, toc_bits), width = 1 / cells;

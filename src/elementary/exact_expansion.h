@@ -1,6 +1,6 @@
-// Exact sums of doubles (Shewchuk 1997): for signs of terms of all sizes, which pairs of doubles cannot tell and integers
-// take long for. An expansion is a sum of doubles in ascending order of size that do not overlap, without zeros: its
-// sign is that of the last one. Exact as long as nothing over- or underflows, which the caller sees to.
+// Exact sums of doubles (Shewchuk 1997): for signs of terms of all sizes, which pairs of doubles cannot tell and
+// integers take long for. An expansion is a sum of doubles in ascending order of size that do not overlap, without
+// zeros: its sign is that of the last one. Exact as long as nothing over- or underflows, which the caller sees to.
 #pragma once
 
 #include <algorithm>

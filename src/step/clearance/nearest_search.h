@@ -81,7 +81,7 @@ class NearestSearch {
         }
       }
       Pair pair = take();
-      const bool is_done = prunes(pair.squared);  // nothing else is nearer
+      const bool is_done = prunes(pair.squared);            // nothing else is nearer
       if (is_done || (plane_ > 0 ? isOver() : isLate())) {  // boxes along a plane take long
         found_.cut = found_.cut || !is_done;
         settleSquared(pair.squared);

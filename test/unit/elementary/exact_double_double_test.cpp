@@ -67,7 +67,9 @@ TEST(ExactDoubleDouble, TermsOfAllSizesHaveExactSigns) {
   int decided = 0;
   for (int i = 0; i < 1000; ++i) {
     PairMotion pair = falling(0.5, i % 2 == 0);
-    const auto tiny = [&] { return std::ldexp(random() % 2 == 0 ? 1.5 : -1.0, -900 - static_cast<int>(random() % 100)); };
+    const auto tiny = [&] {
+      return std::ldexp(random() % 2 == 0 ? 1.5 : -1.0, -900 - static_cast<int>(random() % 100));
+    };
     const bool everywhere = i % 5 == 0;  // then products of three are smaller than doubles can be
     for (auto& time : pair.x) {
       for (int corner = 1; corner < 4; ++corner) time[corner][2] = tiny();
