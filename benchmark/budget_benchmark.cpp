@@ -1,12 +1,8 @@
 // How far a step runs over its budget on input that is made to be slow: what trackers send when they fail, what nobody
 // sends but an attacker, and the largest steps that there are. What counts is the processor time of the thread from the
 // end of the budget on: on an idle core the time by the clock, and on a busy one without that of the others.
-#include <sys/time.h>
-
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstring>
-#include <ctime>
 #include <fstream>
 #include <functional>
 #include <iostream>
@@ -187,32 +183,11 @@ double quantile(const std::vector<double>& values, double share) {
   return values.empty() ? 0 : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-double processorMs() {
-  timespec used{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
-  return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
-}
-
-/// What the thread had used when its budget ended; written by a signal, which the timer sends at that moment.
-volatile double used_at_end_ms = 0;
-volatile std::sig_atomic_t has_ended = 0;
-
-void startTimer(double ms) {
-  itimerval timer{};
-  timer.it_value.tv_sec = static_cast<time_t>(ms / 1000);
-  timer.it_value.tv_usec = static_cast<suseconds_t>(1e3 * ms) % 1000000;
-  setitimer(ITIMER_REAL, &timer, nullptr);
-}
-
 nlohmann::json measure(const Attack& attack, double budget_ms, std::size_t steps) {
   std::vector<double> over_ms;
   std::size_t cut = 0;
   for (std::size_t round = 0; round < steps; ++round) {
-    has_ended = 0;
-    startTimer(budget_ms);
-    cut += attack.run(round, Deadline::after(budget_ms));
-    over_ms.push_back(has_ended ? processorMs() - used_at_end_ms : 0);
-    startTimer(0);
+    over_ms.push_back(overrunMs(budget_ms, [&] { cut += attack.run(round, Deadline::after(budget_ms)); }));
   }
   std::sort(over_ms.begin(), over_ms.end());
   return {{"input", attack.name},
@@ -227,10 +202,6 @@ nlohmann::json measure(const Attack& attack, double budget_ms, std::size_t steps
 }
 
 nlohmann::json measureAll(const std::vector<std::string>& scenes, std::size_t steps, const std::string& only) {
-  std::signal(SIGALRM, [](int) {
-    used_at_end_ms = processorMs();
-    has_ended = 1;
-  });
   nlohmann::json out{{"machine", machine()}, {"runs", nlohmann::json::array()}};
   for (const Attack& attack : attacks(scenes)) {
     if (attack.name.find(only) == std::string::npos) continue;

@@ -52,7 +52,6 @@ function(set_test_options name)
   set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
 endfunction()
 set_test_options(deformable_ccd_test_support)
-set_target_properties(deformable_ccd_test_support PROPERTIES UNITY_BUILD ${DEFORMABLE_CCD_UNITY})
 target_precompile_headers(deformable_ccd_test_support PRIVATE
   <gtest/gtest.h> <random> ${COMMON_HEADERS} <oracle/oracle.h> <dccd/stream.h>)
 

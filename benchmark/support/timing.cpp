@@ -2,15 +2,51 @@
 
 #include <hwy/targets.h>
 #include <malloc.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
+#include <ctime>
 #include <fstream>
 #include <string>
 #include <thread>
 
 namespace dccd {
 namespace benchmarks {
+namespace {
+
+double threadMs() {
+  timespec used{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
+}
+
+/// What the thread had used when its budget ended; written by a signal, which the timer sends at that moment.
+volatile double used_at_end_ms = 0;
+volatile std::sig_atomic_t has_ended = 0;
+
+void startTimer(double ms) {
+  itimerval timer{};
+  timer.it_value.tv_sec = static_cast<time_t>(ms / 1000);
+  timer.it_value.tv_usec = static_cast<suseconds_t>(1e3 * ms) % 1000000;
+  setitimer(ITIMER_REAL, &timer, nullptr);
+}
+
+}  // namespace
+
+double overrunMs(double budget_ms, const std::function<void()>& run) {
+  std::signal(SIGALRM, [](int) {
+    used_at_end_ms = threadMs();
+    has_ended = 1;
+  });
+  has_ended = 0;
+  startTimer(budget_ms);
+  run();
+  const double over_ms = has_ended ? threadMs() - used_at_end_ms : 0;
+  startTimer(0);
+  return over_ms;
+}
 
 nlohmann::json spread(std::vector<double> values) {
   std::sort(values.begin(), values.end());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -23,6 +24,10 @@ nlohmann::json spread(std::vector<double> values);
 
 /// {"median", "quartile_1", "quartile_3", "runs"} of ratios taken run by run; of at least one value.
 nlohmann::json quartiles(std::vector<double> values);
+
+/// Processor time that the calling thread takes for `run` past the end of its budget, which begins with the call; 0
+/// where it ends in time. By the timer of the process (SIGALRM): one at a time.
+double overrunMs(double budget_ms, const std::function<void()>& run);
 
 /// Memory of this process that is in use [bytes].
 std::size_t residentBytes();

@@ -68,6 +68,9 @@ constexpr double RECORD_PADDING = 0.5;
 constexpr double RECORD_SHARE = 0.125;
 /// [1] Slack of a margin in records, of the largest coordinate: the roundings of both its sums.
 constexpr double RECORD_MARGIN = 4 * HALF_ULP;
+/// [m] Largest coordinates of a scene whose vertices are taken as they are: others are scaled to 1 m. Larger,
+/// differences come to FUSED_LARGEST_M; smaller, products of short edges underflow in floats.
+constexpr double SCENE_SMALLEST_M = 0x1p-20, SCENE_LARGEST_M = 0x1p28;
 constexpr double RECORD_SMALLEST_RANGE = 0x1p-20;  ///< [1] guard on the records' range, of the largest coordinate
 /// [1] Margin of a separation that is a sum of several, which must not come out too small.
 DCCD_MARGIN double SEPARATION_SUM = 0x1p-50;

@@ -99,10 +99,12 @@ class SceneArrays {
 
   /// Copies the positions, leaves out what is not finite or not active, and sets the record scale. may_pass_by: not of
   /// bodies that are far and meet neither the map nor themselves. parallel(n, piece, f): calls f(first, last) over
-  /// [0, n), in parallel pieces of about that size or not.
+  /// [0, n), in parallel pieces of about that size or not. may_scale: nothing but signs is asked of the vertices, so
+  /// that those of very large or very small scenes may be multiplied by a power of two, if that rounds nothing.
   /// Throws std::invalid_argument naming the body when a frame has the wrong number of vertices.
   template <class Parallel>
-  void record(const Step& step, StepStats& stats, const Parallel& parallel, bool may_pass_by = false) {
+  void record(const Step& step, StepStats& stats, const Parallel& parallel, bool may_pass_by = false,
+              bool may_scale = false) {
     const bool bounds_valid = beginRecord(step, may_pass_by);
     const std::size_t n = pieces_.size(), unit = piecesInAUnit();
     parallel(n, unit, [&](std::size_t first, std::size_t last) {
@@ -112,7 +114,7 @@ class SceneArrays {
     parallel(n, unit, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) spanPiece(pieces_[i]);
     });
-    endRecord(any_kept);
+    endRecord(any_kept, may_scale);
   }
   void record(const Step& step, StepStats& stats) {
     record(step, stats, [](std::size_t n, std::size_t, const auto& f) { f(std::size_t{0}, n); });
@@ -174,6 +176,7 @@ class SceneArrays {
   void forgetBounds() { bounds_valid_ = false; }
 
   const std::vector<SceneBody>& bodies() const { return bodies_; }
+  /// [m], or that times a power of two, as all bounds; see record().
   const VertexMotion* vertices() const { return vertices_.get(); }
   /// The RECORD values of an internal vertex, after refit().
   const std::uint16_t* record(Index internal) const { return records_.data() + internal * simd::RECORD; }
@@ -242,7 +245,8 @@ class SceneArrays {
   void closeCopy(SceneBody& body, const Body& motion, const std::array<Piece*, 2>& pieces, bool bounds_valid,
                  StepStats& stats);
   void spanPiece(Piece& piece) const;
-  void endRecord(bool any_kept);
+  void endRecord(bool any_kept, bool may_scale);
+  bool scaleVertices();
   bool recordRadii(SceneBody& body, const Body& motion);
   void setRange(bool keep);
   void setMargin(const SceneBody& body, double reach_m, std::uint16_t* margin16) const;

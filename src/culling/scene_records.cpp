@@ -313,7 +313,7 @@ void SceneArrays::spanPiece(Piece& piece) const {
   simd::projectionBounds(vertices[piece.first].t0, piece.last - piece.first, piece.bounds_min, piece.bounds_max);
 }
 
-void SceneArrays::endRecord(bool any_kept) {
+void SceneArrays::endRecord(bool any_kept, bool may_scale) {
   for (SceneBody& body : bodies_) {
     if (body.kept) continue;
     std::fill_n(body.bounds_min, 8, std::numeric_limits<double>::infinity());
@@ -327,10 +327,49 @@ void SceneArrays::endRecord(bool any_kept) {
       body.bounds_max[d] = std::max(body.bounds_max[d], piece.bounds_max[d]);
     }
   }
-  setRange(any_kept);
+  const bool scaled = may_scale && scaleVertices();
+  setRange(any_kept && !scaled);
   for (SceneBody& body : bodies_) {
     if (!body.kept) setMargin(body, body.reach_m, body.margin);
   }
+}
+
+/// Filters compute in floats, products of many coordinates in doubles: of scenes far from 1 m they could tell nothing.
+/// A contact and its time stay the same where all coordinates are multiplied by one number, and by a power of two none
+/// is rounded, unless it becomes denormal. Nothing of such a step is kept for the next.
+bool SceneArrays::scaleVertices() {
+  double largest = 0;
+  for (const SceneBody& body : bodies_) {
+    for (int k = 0; k < 3; ++k) {
+      if (body.bounds_min[k] > body.bounds_max[k]) continue;  // nothing of it is recorded
+      largest = std::max({largest, std::abs(body.bounds_min[k]), std::abs(body.bounds_max[k])});
+    }
+    if (body.reach_m > 0) return false;
+  }
+  const bool fits = largest >= tolerance::SCENE_SMALLEST_M && largest <= tolerance::SCENE_LARGEST_M;
+  if (uncertain_ || fits || largest == 0) return false;
+  const int up = -std::ilogb(largest);
+  const auto forEach = [&](const auto& f) {
+    for (const SceneBody& body : bodies_) {
+      if (body.passed_by) continue;
+      VertexMotion* const vertices = vertices_.get() + body.internal_begin;
+      for (std::size_t i = 0; i < body.usedCount(); ++i) {
+        for (int k = 0; k < 3; ++k) f(vertices[i].t0[k]), f(vertices[i].t1[k]);
+      }
+    }
+  };
+  bool rounds = false;
+  forEach([&](double x) { rounds = rounds || std::ldexp(std::ldexp(x, up), -up) != x; });
+  if (rounds) return false;
+  forEach([&](double& x) { x = std::ldexp(x, up); });
+  for (SceneBody& body : bodies_) {
+    body.kept = body.recorded = false;
+    for (int d = 0; d < 8; ++d) {
+      body.bounds_min[d] = std::ldexp(body.bounds_min[d], up);
+      body.bounds_max[d] = std::ldexp(body.bounds_max[d], up);
+    }
+  }
+  return true;
 }
 
 /// What the records span. Where some body rests, the range is wider than needed and stays for as long as it holds the

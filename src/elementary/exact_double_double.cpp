@@ -25,6 +25,7 @@
 #include <limits>
 
 #include "dccd/tolerances.h"
+#include "elementary/exact_expansion.h"
 
 namespace dccd {
 namespace exact {
@@ -49,6 +50,14 @@ Factor interpolate(const DoubleDouble& d0, const DoubleDouble& d1, double s, con
   const DoubleDouble p1 = twoProduct(d1.hi, Halves(d1.hi), t, t_halves);
   const DoubleDouble sum = twoSum(p0.hi, p1.hi);
   return Factor(twoSum(sum.hi, ((p0.lo + p1.lo) + (d0.lo * s + d1.lo * t)) + sum.lo));
+}
+
+/// The exponent of the lowest bit that is set; of 0 one that is never the lowest.
+int lowestBitOf(double x) {
+  int exponent;
+  const auto bits = static_cast<std::int64_t>(std::ldexp(std::frexp(x, &exponent), 53));
+  return bits == 0 ? std::numeric_limits<int>::max()
+                   : exponent - 53 + __builtin_ctzll(static_cast<std::uint64_t>(bits));
 }
 
 /// a b - c d.
@@ -112,8 +121,44 @@ double CoplanarityCubic::valueAt(double t) const {
 int CoplanarityCubic::signAt(double t) const {
   const double rough = roughValueAt(t);
   if (std::fabs(rough) > rough_error_) return rough > 0 ? 1 : -1;
-  const double value = valueAt(t);
-  return value > error_ ? 1 : value < -error_ ? -1 : 0;
+  return signOf(valueAt(t), t);
+}
+
+/// Each axis is multiplied by a power of two of its own, which multiplies f, so that its largest difference is about
+/// 2^LARGEST and f below 2^(3 LARGEST + 10). All terms are multiples of the product of the lowest bits on the three
+/// axes, t and 1-t being multiples of 2^-52: none underflows where that is representable, and where those of one axis
+/// or two are.
+int CoplanarityCubic::exactSignAt(double t) const {
+  constexpr int LARGEST = 300, LOWEST = -1074;
+  if (!std::isfinite(error_)) return 0;
+  double scale[3];
+  int lowest = 0;
+  for (int k = 0; k < 3; ++k) {
+    double largest = 0;
+    int lowest_bit = LARGEST;
+    for (const auto& vectors : difference_) {
+      for (const auto& vector : vectors) {
+        largest = std::max(largest, std::fabs(vector[k].hi));
+        for (const double x : {vector[k].hi, vector[k].lo}) lowest_bit = std::min(lowest_bit, lowestBitOf(x));
+      }
+    }
+    if (largest == 0) return 0;
+    const int up = std::min(LARGEST - std::ilogb(largest), 1000);  // whose power is finite
+    scale[k] = std::ldexp(1.0, up);
+    lowest += std::min(0, lowest_bit + up - 52);
+  }
+  if (lowest < LOWEST) return 0;
+  const double s = 1 - t;
+  Expansion x[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const auto scaled = [&](const DoubleDouble& d) { return Expansion({d.hi * scale[k], d.lo * scale[k]}); };
+      x[i][k] = scaled(difference_[0][i][k]) * s + scaled(difference_[1][i][k]) * t;
+    }
+  }
+  const auto term = [&](int k, int i, int j) { return (x[0][i] * x[1][j] - x[0][j] * x[1][i]) * x[2][k]; };
+  const Expansion f = term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1);
+  return f.isLost() ? 0 : f.sign();
 }
 
 double CoplanarityCubic::slopeAt(double t) const {
@@ -155,7 +200,8 @@ struct Tangent {
 }  // namespace
 
 std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits) {
-  constexpr int MOST_STEPS = 16;  // Newton's; from the batched tier's brackets one or two suffice
+  constexpr int MOST_STEPS = 16;       // Newton's; from the batched tier's brackets one or two suffice
+  constexpr int MOST_EXACT_SIGNS = 2;  // later ones would take longer than integers do
   constexpr double GRID = tolerance::TIME_GRID;
   const double cells = std::ldexp(1.0, toc_bits), width = 1 / cells;
   auto low = static_cast<std::int64_t>(lo * cells);  // exact, like all products with cells and width
@@ -164,11 +210,14 @@ std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc
   const int before = f.signAt(lo);
   if (before == 0) return -1;
   Tangent tangent;
+  int exact_signs = 0;
   tangent.x = high - low == 2 ? static_cast<double>(low + 1) * width : lo + std::floor(0.5 * (hi - lo) / GRID) * GRID;
   for (int step = 0; step < MOST_STEPS; ++step) {
     tangent.value = f.valueAt(tangent.x);
-    if (!(std::fabs(tangent.value) > f.error())) return -1;
-    if ((tangent.value > 0) == (before > 0)) {
+    if (!(std::fabs(tangent.value) > f.error()) && ++exact_signs > MOST_EXACT_SIGNS) return -1;
+    const int sign = f.signOf(tangent.value, tangent.x);
+    if (sign == 0) return -1;
+    if (sign == before) {
       lo = tangent.x;
       low = std::max(low, static_cast<std::int64_t>(lo * cells));
     } else {

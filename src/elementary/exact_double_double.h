@@ -51,8 +51,13 @@ class CoplanarityCubic {
   double roughValueAt(double t) const;
   double roughError() const { return rough_error_; }
 
-  /// Sign of f at a multiple of 2^-52 in [0,1]; 0 where the arithmetic cannot tell.
+  /// Sign of f at a multiple of 2^-52 in [0,1]; 0 where it is zero, or the arithmetic cannot tell.
   int signAt(double t) const;
+  /// The same where value is valueAt(t), or by exactSignAt() if that leaves it open.
+  int signOf(double value, double t) const { return value > error_ ? 1 : value < -error_ ? -1 : exactSignAt(t); }
+  /// The same by exact sums, for terms of all sizes; 0 also where they would be too long, or leave the range of
+  /// doubles.
+  int exactSignAt(double t) const;
 
   /// f'(t) at a multiple of 2^-52 in [0,1] in plain double; exact f' differs by at most slopeError().
   double slopeAt(double t) const;

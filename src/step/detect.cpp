@@ -6,6 +6,7 @@
 #include <atomic>
 #include <sstream>
 
+#include "base/accuracy.h"
 #include "dccd/tolerances.h"
 #include "step/clearance/clearance_finder.h"
 #include "step/conclude.h"
@@ -217,7 +218,9 @@ void History::Impl::runPart(const Step& step, std::size_t index, std::size_t cou
 /// The part's positions into the scene's arrays, and what of it needs bounds. False: there was no time for these.
 bool History::Impl::fill(const Part& part, StepStats& stats) {
   Clock::time_point start = Clock::now();
-  scene.record(part.step, stats, prepared.threads, !part.options().clearance.wanted);
+  const bool in_metres =
+      part.options().clearance.wanted || holdsDistance(part.options().accuracy.rung) || prepared.map.surface;
+  scene.record(part.step, stats, prepared.threads, !part.options().clearance.wanted, !in_metres);
   for (std::size_t b = 0; b < carried.map.size(); ++b) {
     if (!scene.bodies()[b].unchanged) carried.map[b] = MapAnswer();
   }

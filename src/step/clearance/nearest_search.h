@@ -81,8 +81,8 @@ class NearestSearch {
         }
       }
       Pair pair = take();
-      const bool is_done = prunes(pair.squared);  // nothing else is nearer
-      if (is_done || isLate()) {
+      const bool is_done = prunes(pair.squared);            // nothing else is nearer
+      if (is_done || (plane_ > 0 ? isOver() : isLate())) {  // boxes along a plane take long
         found_.cut = found_.cut || !is_done;
         settleSquared(pair.squared);
         break;
@@ -371,6 +371,37 @@ class NearestSearch {
     return best;
   }
 
+  /// Of two trees: what of the other one may be nearer to an item of the first (or, second, the other way round) than
+  /// what was found, the nearest boxes first. Ends where nothing is nearer than at_least_m.
+  template <class A, class B, class Meet>
+  void compareAround(const A& a, const B& b, std::uint32_t item, bool second, double at_least_m, const Meet& meet) {
+    const auto look = [&](const auto& tree, const StepBox& box, const auto& compareWith) {
+      const auto gapTo = [&](const StepBox& other) { return squaredGap(box, other, goal_.at_end ? 1 : 0); };
+      open_.assign(1, {0.0, tree.root()});
+      while (!open_.empty() && at_least_m < enough_m_ && !isLate()) {
+        const auto [squared, in] = open_.back();
+        open_.pop_back();
+        if (squared >= enough_squared_) continue;
+        if (tree.isLeaf(in)) {
+          for (std::uint32_t other = tree.first(in); other < tree.first(in) + tree.count(in); ++other) {
+            if (gapTo(tree.itemBox(other)) < enough_squared_) compareWith(other);
+          }
+          continue;
+        }
+        tree.forChildren(in, [&](std::uint32_t child) {
+          open_.emplace_back(gapTo(tree.box(child)), child);
+          const std::size_t last = open_.size() - 1;
+          if (last > 0 && open_[last - 1].first < open_[last].first) std::swap(open_[last - 1], open_[last]);
+        });
+      }
+    };
+    if (second) {
+      look(a, b.itemBox(item), [&](std::uint32_t other) { compare(a, b, {0, 0, other, item, true}, meet); });
+    } else {
+      look(b, a.itemBox(item), [&](std::uint32_t other) { compare(a, b, {0, 0, item, other, true}, meet); });
+    }
+  }
+
   /// Of things that face each other the nearest two tell a direction that is wrong for what is beside them. As far as
   /// one can be right for all, it is that in which their hulls are furthest apart, at either end of the step. A few
   /// corners tell it by their nearest points: those that reach furthest along the direction before.
@@ -378,6 +409,8 @@ class NearestSearch {
   void findPlane(const A& a, const B& b, const Meet& meet) {
     Turning plane{Vec3::Zero(), Vec3::Zero()};
     plane_ = 0;
+    compareAround(a, b, found_.item[0], false, 0, meet);
+    compareAround(a, b, found_.item[1], true, 0, meet);
     for (int end = 1; end >= (goal_.at_end ? 1 : 0); --end) {
       const std::size_t which = end == 0 ? Reach::START : Reach::END;
       pair_.set(a.itemHull(found_.item[0]), b.itemHull(found_.item[1]));
@@ -393,12 +426,13 @@ class NearestSearch {
       most_m = -std::numeric_limits<double>::infinity();
       for (std::size_t round = 0; round < MOST_PLANES; ++round) {
         const Vec3& n = nearest.direction;
-        if (n == Vec3::Zero() || isLate()) return;
+        if (n == Vec3::Zero() || isOver()) return;
         const Furthest on_a = furthest(a, {-n, -n}, which), on_b = furthest(b, {n, n}, which);
         const double apart_m = -on_a.reach_m - on_b.reach_m;
         if (apart_m > most_m) most_m = apart_m, plane[end] = n;
         if (most_m - slack_m_ >= enough_m_) break;
-        compare(a, b, {0, 0, facing(a, on_a.leaf, -n, end), facing(b, on_b.leaf, n, end), true}, meet);
+        compareAround(a, b, facing(a, on_a.leaf, -n, end), false, most_m - slack_m_, meet);
+        compareAround(a, b, facing(b, on_b.leaf, n, end), true, most_m - slack_m_, meet);
         if (!(enough_m_ > 0)) return;
         for (int side = 0; side < 2; ++side) {
           const VertexMotion& corner = (side == 0 ? on_a : on_b).corner;
@@ -425,6 +459,7 @@ class NearestSearch {
     double apart_m = goal_.at_end ? apart_m_[1] : std::min(apart_m_[0], apart_m_[1]);
     if (apart_m - slack_m_ < enough_m_) return false;
     if (!goal_.at_end) {
+      if (isOver()) return false;
       const Turning against{-n[0], -n[1]};
       apart_m = std::min(apart_m, -furthest(a, against, Reach::MIDDLE).reach_m - furthest(b, n, Reach::MIDDLE).reach_m);
     }
@@ -488,6 +523,7 @@ class NearestSearch {
   void settleSquared(double squared) { settled_squared_ = std::min(settled_squared_, squared); }
   void settle(double lower_m) { found_.lower_m = std::min(found_.lower_m, lower_m); }
   bool isLate();
+  bool isOver() const { return found_.cut || goal_.deadline.isOver(); }  // for what takes longer than to look
   Nearest takeAt(double t);
   void setDirection(const Turning& direction);
   void takeMeeting();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
@@ -159,6 +160,55 @@ TEST(SceneRecords, ABodyWithoutAnythingActiveSpansNothing) {
   }
   EXPECT_GT(highest - lowest, 32764)
       << "the records span what is active: its own positions are hundreds of metres away";
+}
+
+TEST(SceneRecords, FarFromAMetreVerticesAreScaledWhereThatRoundsNothing) {
+  const Bodies at_a_metre(5);
+  const auto recordOf = [](const Bodies& truth, SceneArrays& scene, bool may_scale) {
+    StepStats stats;
+    scene.record(truth.step(), stats, Shuffled{5}, false, may_scale);
+    scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
+  };
+  // Of the first body, all of which is active.
+  const auto expectTimes = [](const SceneArrays& scene, const Bodies& truth, int exponent) {
+    const SceneBody& body = scene.bodies()[0];
+    for (std::size_t i = 0; i < body.usedCount(); ++i) {
+      const VertexMotion& vertex = scene.vertices()[body.internal_begin + i];
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_EQ(vertex.t0[k], std::ldexp(truth.t0[0][body.slot_vertex[i]][k], exponent));
+        EXPECT_EQ(vertex.t1[k], std::ldexp(truth.t1[0][body.slot_vertex[i]][k], exponent));
+      }
+    }
+  };
+  SceneArrays plain;
+  plain.setBodies(at_a_metre.step().bodies);
+  recordOf(at_a_metre, plain, true);
+  expectTimes(plain, at_a_metre, 0);
+  for (const int exponent : {160, -160, -1000}) {
+    Bodies truth = at_a_metre;
+    for (auto* positions : {&truth.t0, &truth.t1}) {
+      for (Positions& of : *positions) {
+        for (Vec3& p : of) {
+          for (int k = 0; k < 3; ++k) p[k] = std::ldexp(p[k], exponent);
+        }
+      }
+    }
+    SceneArrays scene;
+    scene.setBodies(at_a_metre.step().bodies);  // the same order of features
+    for (int times = 0; times < 2; ++times) {   // nothing is kept
+      recordOf(truth, scene, true);
+      expectTimes(scene, truth, -exponent - 2);  // the largest coordinate is 4 to 5 m
+      for (const SceneBody& body : scene.bodies()) EXPECT_FALSE(body.kept);
+      for (Index v = 0; v < scene.vertexCount(); ++v)
+        ASSERT_EQ(std::memcmp(scene.record(v), plain.record(v), simd::RECORD * sizeof(std::uint16_t)), 0) << v;
+    }
+    recordOf(truth, scene, false);
+    expectTimes(scene, truth, 0);
+    if (exponent < 0) continue;
+    truth.t1[0][7].y() = 1 / 3.0 * 0x1p-1000;  // would become denormal
+    recordOf(truth, scene, true);
+    expectTimes(scene, truth, 0);
+  }
 }
 
 }  // namespace

@@ -247,9 +247,21 @@ TEST(Unfolded, NothingIsCertifiedOfFoldsAndDegenerateFaces) {
   EXPECT_FALSE(certified(topology, line, line));
   const Positions point(6, Vec3(1, 2, 3));
   EXPECT_FALSE(certified(topology, point, point));
-  Positions huge = flat;
-  for (Vec3& p : huge) p *= 1e300;
-  EXPECT_FALSE(certified(topology, huge, huge));
+}
+
+TEST(Unfolded, IsCertifiedOfAnySize) {
+  const Topology topology = Topology::grid(2, 3);
+  const Positions flat{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}, {1, 1, 0}, {2, 1, 0}};
+  for (const double size : {1e300, 1e-300, 1e-310}) {
+    Positions scaled = flat, folded = flat;
+    folded[2] = folded[0] + Vec3(0, 0, 0.1);
+    folded[5] = folded[3] + Vec3(0, 0, 0.1);
+    for (Positions* positions : {&scaled, &folded}) {
+      for (Vec3& p : *positions) p *= size;
+    }
+    EXPECT_TRUE(certified(topology, scaled, scaled)) << size;
+    EXPECT_FALSE(certified(topology, scaled, folded)) << size;
+  }
 }
 
 }  // namespace

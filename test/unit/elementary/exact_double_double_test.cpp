@@ -61,6 +61,33 @@ TEST(ExactDoubleDouble, CellsFromTheWholeStepAreThoseOfTheIntegers) {
   EXPECT_GT(found, 3 * 2000 / 2);
 }
 
+/// The face is not quite flat, by as little as pairs of doubles cannot hold beside 1: on which side of 0.5 the root is.
+TEST(ExactDoubleDouble, TermsOfAllSizesHaveExactSigns) {
+  std::mt19937_64 random(41);
+  int decided = 0;
+  for (int i = 0; i < 1000; ++i) {
+    PairMotion pair = falling(0.5, i % 2 == 0);
+    const auto tiny = [&] {
+      return std::ldexp(random() % 2 == 0 ? 1.5 : -1.0, -900 - static_cast<int>(random() % 100));
+    };
+    const bool everywhere = i % 5 == 0;  // then products of three are smaller than doubles can be
+    for (auto& time : pair.x) {
+      for (int corner = 1; corner < 4; ++corner) time[corner][2] = tiny();
+      for (int k = 0; k < 2 && everywhere; ++k) time[0][k] = tiny();
+    }
+    const exact::CoplanarityCubic f(PairKind::VERTEX_FACE, pair);
+    const std::int64_t cell = exact::cellOfRoot(f, 0.25, 0.75, 32);
+    EXPECT_EQ(cell < 0, everywhere) << i;
+    if (cell < 0) continue;
+    ++decided;
+    const ElementaryResult truth = test::decideWithTier(Tier::BIG_INTEGER, PairKind::VERTEX_FACE, pair, 32);
+    ASSERT_EQ(truth.verdict, Verdict::CONTACT);
+    ASSERT_EQ(std::ldexp(static_cast<double>(cell), -32), truth.toc_lower) << i;
+    EXPECT_EQ(f.signAt(0.5), truth.toc_lower < 0.5 ? -f.signAt(0) : f.signAt(0)) << i;
+  }
+  EXPECT_GT(decided, 700);
+}
+
 TEST(ExactDoubleDouble, GridPointItselfIsLeftToTheIntegers) {
   const PairMotion pair = falling(0.5, false);
   const exact::CoplanarityCubic f(PairKind::VERTEX_FACE, pair);

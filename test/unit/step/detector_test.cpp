@@ -51,6 +51,30 @@ TEST(Detector, TheSameForAnyNumberOfThreadsAndAnyTarget) {
   }
 }
 
+/// A scene's size changes neither its contacts nor what the filters leave: be it that of denormal numbers.
+TEST(Detector, TheSameOfAnySize) {
+  TestStep step = crumpled(1, 3, 14);
+  const auto times = [&](int exponent) {
+    TestStep scaled = step;
+    for (StepBody& body : scaled.bodies) {
+      for (Positions* positions : {&body.t0, &body.t1}) {
+        for (Vec3& p : *positions) {
+          for (int k = 0; k < 3; ++k) p[k] = std::ldexp(std::floor(std::ldexp(p[k], 20)), exponent - 20);
+        }
+      }
+    }
+    return scaled;
+  };
+  const Outcome expected = runOnce(times(0), {});
+  ASSERT_GT(expected.contacts.size(), 1000u);
+  for (const int exponent : {1000, 160, -160, -1050}) {
+    const Outcome result = runOnce(times(exponent), {});
+    EXPECT_EQ(differenceOfResults(result, expected), "") << exponent;
+    EXPECT_EQ(result.stats[Stage::PLANAR].out, expected.stats[Stage::PLANAR].out) << exponent;
+    EXPECT_EQ(result.stats.tiers.settled, expected.stats.tiers.settled) << exponent;
+  }
+}
+
 TEST(Detector, ManyBodies) {
   TestStep step;
   for (int b = 0; b < 300; ++b) {
