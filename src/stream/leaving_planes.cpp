@@ -2,16 +2,13 @@
 #include <cmath>
 
 #include "stream/path_search.h"
+#include "stream/radii.h"
 
 namespace dccd {
 namespace {
 
 constexpr double PLANE_ROUNDING = 1e-12;  // [1] of the largest coordinate: far above what heights are rounded by
 constexpr std::size_t MOST_NORMALS = 8;   // of contacts that are tried
-
-double largestRadius(const Body& body) {
-  return body.radius_m && !body.radius_m->empty() ? *std::max_element(body.radius_m->begin(), body.radius_m->end()) : 0;
-}
 
 double lowest(const Positions& positions, const Vec3& direction) {
   double least = SpeedBound::NONE;

@@ -7,6 +7,7 @@
 
 #include "dccd/intended.h"
 #include "stream/pairs_ahead.h"
+#include "stream/path_distances.h"
 
 namespace dccd {
 
@@ -32,9 +33,15 @@ struct PathPair {
   bool may_scale = false;  ///< what is on the path slows down, and the other one has a bound
   bool may_stand = false;  ///< the standing rule is for it
   double leaves_s = 0;     ///< up to then it leaves what it touches
-  // Of the path as far as it was searched.
-  double least_m = SpeedBound::NONE;
-  bool came_nearer = false;
+  PathDistances::Way way;
+  struct Asked {
+    PathDistances::Stretch of;
+    double enough_m = 0, tolerance_m = 0;  ///< what was asked for
+    double least_m = 0;                    ///< D of the theorem over it, at least
+  };
+  std::vector<Asked> asked;
+  double stands_s = 0;        ///< up to then it comes no nearer than it is at the begin,
+  bool comes_nearer = false;  ///< and afterwards it does, or nobody knows
 
   /// g(t) of the theorem, rounded up.
   double untilNeeds(double ahead_s) const;
