@@ -72,7 +72,7 @@ class LeavingPlanes {
   std::vector<Positions> ends_;
   std::vector<double> leaves_m_;
   std::vector<double> time_s_;
-  PathPace pace_;
+  std::vector<double> needed_m_;  // at each of these
   std::uint16_t mover_, partner_;
   Eigen::Isometry3d to_map_ = Eigen::Isometry3d::Identity();  // the frame in which all of this is
   std::vector<Eigen::AlignedBox3d> pieces_;                   // around the body, wider by what the piece leaves its way
