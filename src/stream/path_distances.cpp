@@ -151,10 +151,10 @@ double PathDistances::bendOf(const Way& way, const Stretch& stretch) const {
   return way.bends * most_m;
 }
 
-double PathDistances::bendsOf(const Way& way, const Stretch& stretch) const {
+double PathDistances::arcOf(const Way& way, const Stretch& stretch) const {
   const std::size_t piece = pieceAt(stretch.from_s);
   const double share = shareAt(piece, stretch.to_s) - shareAt(piece, stretch.from_s);
-  return bendOf(way, stretch) + way.arc_m[piece] * share * share * ABOVE + way.rounding_m;
+  return way.arc_m[piece] * share * share * ABOVE + way.rounding_m;
 }
 
 /// Of the first piece and of the last one it may go a part, so that it is off both chords.
@@ -162,7 +162,7 @@ double PathDistances::goneBy(const Way& way, const Stretch& stretch) const {
   const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
   double arc_m = 0;
   for (std::size_t k = first; k <= last; ++k) arc_m = std::max(arc_m, way.arc_m[k]);
-  return (way.gone_m[last + 1] - way.gone_m[first] + 2 * arc_m + 2 * way.rounding_m) * ABOVE + bendOf(way, stretch);
+  return (way.gone_m[last + 1] - way.gone_m[first] + 2 * arc_m + 2 * way.rounding_m) * ABOVE;
 }
 
 /// Between two ends of pieces the way leaves its own chord by the arc, and that chord leaves the stretch's by no more
@@ -187,7 +187,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
     mover.motion[i] = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
   }
   mover.moving.refit(mover.motion.data());
-  return (off_m + arc_m) * ABOVE + way.rounding_m + bendOf(way, stretch);
+  return (off_m + arc_m) * ABOVE + way.rounding_m;
 }
 
 double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {

@@ -38,14 +38,16 @@ class DCCD_HIDDEN PathDistances {
   /// At least one of the two is on the path.
   Way wayOf(const std::array<std::uint16_t, 2>& body);
 
-  /// A lower bound of the two surfaces' distance over the stretch, less their radii and by how much what is meant may
-  /// leave the straight ways through it [m]; of a single time without bend_m. Within the tolerance, but for these, of
-  /// what is true where that is below enough_m. 0: nobody knows.
+  /// A lower bound of the two surfaces' distance over the stretch, less their radii and by how much the path's pieces
+  /// leave the straight ways through it [m]. Within the tolerance, but for these, of what is true where that is below
+  /// enough_m. 0: nobody knows.
   double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m);
   /// How far any vertex of the mover comes from where it is when the stretch begins, at most [m].
   double goneBy(const Way& way, const Stretch& stretch) const;
-  /// What over() takes off for bends, where the stretch is within one piece [m].
-  double bendsOf(const Way& way, const Stretch& stretch) const;
+  /// What over() takes off for the turn where the stretch is within one piece [m].
+  double arcOf(const Way& way, const Stretch& stretch) const;
+  /// By how much what is meant may leave the pieces of the stretch, both together [m]; 0 of a single time.
+  double bendOf(const Way& way, const Stretch& stretch) const;
   /// Where to halve the stretch: at an end of a piece, or within the one that it is in.
   double cutOf(const Stretch& stretch) const;
   /// When the piece that holds the time, or begins at it, ends.
@@ -70,7 +72,6 @@ class DCCD_HIDDEN PathDistances {
   std::size_t pieceAt(double time_s) const;
   std::size_t lastPieceOf(const Stretch& stretch) const;
   double shareAt(std::size_t piece, double time_s) const;
-  double bendOf(const Way& way, const Stretch& stretch) const;
   Eigen::Isometry3d poseAt(const Way& way, std::size_t piece, double time_s) const;
   Shape& known(std::uint16_t body);
   double place(const Way& way, const Stretch& stretch);

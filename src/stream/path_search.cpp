@@ -100,6 +100,7 @@ class Search {
       }
       pair.separation_m = separationOf(outcome_, row);
       pair.start_m = distance_m;
+      pair.most_m = std::max(distance_m, row.at_end.upper_m);
       pair.deviation_m = static_cast<double>(pair.on_path) * path_.deviation_m;
       pair.rate_m_s = static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
       for (const std::uint16_t body : row.body) {
@@ -139,7 +140,8 @@ class Search {
     return pair.asked.size() < PathSearch::MOST_SEARCHES && !deadline_.isOver();
   }
 
-  /// What D is at least over the stretch: by what was asked before, where that is enough, or asked now.
+  /// What is between the two at least over the stretch, but for bends: by what was asked before, where that is enough,
+  /// or asked now.
   double distanceOver(PathPair& pair, const Stretch& stretch, double enough_m, double tolerance_m) {
     double least_m = pair.start_m - distances_.goneBy(pair.way, {0, stretch.to_s});
     for (const PathPair::Asked& one : pair.asked) {
@@ -166,13 +168,13 @@ class Search {
     const auto isAtLeast = [&](const Stretch& stretch, double held_m) {
       return distanceOver(pair, stretch, held_m, tolerance_m_ / 2) >= held_m;
     };
-    if (!(least_m > 0)) return false;
     if (pair.stands_s < to_s && !pair.comes_nearer && isAtLeast({pair.stands_s, to_s}, least_m)) pair.stands_s = to_s;
     while (pair.stands_s < to_s && !pair.comes_nearer) {
       const Stretch piece{pair.stands_s, std::min(distances_.pieceEnd(pair.stands_s), to_s)};
-      const double held_m = least_m - distances_.bendsOf(pair.way, piece);
+      const double held_m = least_m - distances_.arcOf(pair.way, piece);
+      const double here_m = held_m > 0 ? distanceOver(pair, piece, held_m, tolerance_m_ / 2) : 0;
       const bool holds =
-          held_m > 0 && isAtLeast(piece, held_m) && isAtLeast({piece.to_s, piece.to_s}, least_m);
+          held_m > 0 && here_m >= held_m && (here_m >= least_m || isAtLeast({piece.to_s, piece.to_s}, least_m));
       if (holds) pair.stands_s = piece.to_s;
       pair.comes_nearer = !holds;
     }
@@ -186,12 +188,16 @@ class Search {
     if (holds_s >= to_s || pair.start_m == 0 || (scales && !pair.may_scale)) return std::min(holds_s, to_s);
     const double enough_m = needs(goal, pair, to_s);
     if (!std::isfinite(enough_m)) return std::min(holds_s, to_s);
-    const double tolerance_m = std::max(tolerance_m_ / 2, enough_m / 200);
+    const double tolerance_m = std::max(tolerance_m_ / 2, enough_m / 100);
+    const auto lowest = [&](const Stretch& stretch) {
+      const double bend_m = distances_.bendOf(pair.way, stretch);
+      return distanceOver(pair, stretch, enough_m + bend_m, tolerance_m) - bend_m;
+    };
     double known_s = 0, least_m = SpeedBound::NONE;  // of D
     std::vector<double> ends{to_s};
     while (!ends.empty()) {
       const double end_s = ends.back();
-      const double here_m = std::min(least_m, distanceOver(pair, {known_s, end_s}, enough_m, tolerance_m));
+      const double here_m = std::min(least_m, lowest({known_s, end_s}));
       if (here_m > 0 && needs(goal, pair, end_s) <= here_m) {
         least_m = here_m;
         known_s = end_s;
@@ -222,6 +228,20 @@ class Search {
   double farthest(Goal goal, double most_s) {
     failing_.reset();
     double holds_s = std::min(most_s, path_.endsAt());
+    // D is never more than it is at the begin.
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      const PathPair& pair = pairs_[p];
+      if (goal == Goal::SCALE && pair.may_stand) continue;
+      const double by_bounds_s = goal == Goal::UNTIL ? pair.apart_s : pair.allowed_s;
+      if (by_bounds_s >= holds_s || needs(goal, pair, holds_s) <= pair.most_m) continue;
+      double low_s = 0;
+      for (int i = 0; i < 30; ++i) {
+        const double middle_s = low_s + (holds_s - low_s) / 2;
+        (needs(goal, pair, middle_s) <= pair.most_m ? low_s : holds_s) = middle_s;
+      }
+      holds_s = std::max(by_bounds_s, holds_s);
+      failing_ = p;
+    }
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       const double to_s = holds_s;
       holds_s = farthest(goal, pairs_[p], to_s);

@@ -23,7 +23,7 @@ struct PathPair {
   std::array<std::uint16_t, 2> body{};
   std::size_t number = SafeUntil::NO_PAIR;  ///< its row in the outcome
   double separation_m = 0;
-  double start_m = 0;                    ///< distanceOf() at the path's begin
+  double start_m = 0, most_m = 0;        ///< distanceOf() at the path's begin, at least and at most
   std::size_t on_path = 0;               ///< how many of the two
   double deviation_m = 0, rate_m_s = 0;  ///< of all that are on it together
   // Of what is not on it [m/s]: until the next frame, and at full speed of what slows down and of what does not.
@@ -37,7 +37,7 @@ struct PathPair {
   struct Asked {
     PathDistances::Stretch of;
     double enough_m = 0, tolerance_m = 0;  ///< what was asked for
-    double least_m = 0;                    ///< D of the theorem over it, at least
+    double least_m = 0;                    ///< what is between the two, at least
   };
   std::vector<Asked> asked;
   double stands_s = 0;        ///< up to then it comes no nearer than it is at the begin,
