@@ -152,9 +152,12 @@ double PathDistances::bendOf(const Way& way, const Stretch& stretch) const {
 }
 
 double PathDistances::arcOf(const Way& way, const Stretch& stretch) const {
-  const std::size_t piece = pieceAt(stretch.from_s);
-  const double share = shareAt(piece, stretch.to_s) - shareAt(piece, stretch.from_s);
-  return way.arc_m[piece] * share * share * ABOVE + way.rounding_m;
+  double most_m = 0;
+  for (std::size_t k = pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k) {
+    const double share = shareAt(k, stretch.to_s) - shareAt(k, stretch.from_s);
+    most_m = std::max(most_m, way.arc_m[k] * share * share);
+  }
+  return most_m * ABOVE + way.rounding_m;
 }
 
 /// Of the first piece and of the last one it may go a part, so that it is off both chords.
@@ -172,11 +175,8 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
   Shape& mover = shapes_[way.mover];
   const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
   const Eigen::Isometry3d from = poseAt(way, first, stretch.from_s), to = poseAt(way, last, stretch.to_s);
-  double off_m = 0, arc_m = 0;
-  for (std::size_t k = first; k <= last; ++k) {
-    const double share = shareAt(k, stretch.to_s) - shareAt(k, stretch.from_s);
-    arc_m = std::max(arc_m, way.arc_m[k] * share * share);
-    if (k == first) continue;
+  double off_m = 0;
+  for (std::size_t k = first + 1; k <= last; ++k) {
     const double u = (path_->time_s[k] - stretch.from_s) / (stretch.to_s - stretch.from_s);
     for (const Vec3& c : mover.corners)
       off_m = std::max(off_m, (way.pose[k] * c - ((1 - u) * (from * c) + u * (to * c))).norm());
@@ -187,7 +187,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
     mover.motion[i] = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
   }
   mover.moving.refit(mover.motion.data());
-  return (off_m + arc_m) * ABOVE + way.rounding_m;
+  return off_m * ABOVE + arcOf(way, stretch);
 }
 
 double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {

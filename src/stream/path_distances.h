@@ -44,7 +44,7 @@ class DCCD_HIDDEN PathDistances {
   double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m);
   /// How far any vertex of the mover comes from where it is when the stretch begins, at most [m].
   double goneBy(const Way& way, const Stretch& stretch) const;
-  /// What over() takes off for the turn where the stretch is within one piece [m].
+  /// What over() takes off for turns within the pieces of the stretch [m].
   double arcOf(const Way& way, const Stretch& stretch) const;
   /// By how much what is meant may leave the pieces of the stretch, both together [m]; 0 of a single time.
   double bendOf(const Way& way, const Stretch& stretch) const;

@@ -165,20 +165,32 @@ class Search {
   bool stands(PathPair& pair, double to_s) {
     const double least_m = pair.start_m - 2 * tolerance_m_ - tolerance::CLEARANCE_RELATIVE * pair.start_m;
     // What stays as it is is told from what comes nearer.
-    const auto isAtLeast = [&](const Stretch& stretch, double held_m) {
-      return distanceOver(pair, stretch, held_m, tolerance_m_ / 2) >= held_m;
-    };
-    if (pair.stands_s < to_s && !pair.comes_nearer && isAtLeast({pair.stands_s, to_s}, least_m)) pair.stands_s = to_s;
+    std::vector<double> ends{to_s};
     while (pair.stands_s < to_s && !pair.comes_nearer) {
-      const Stretch piece{pair.stands_s, std::min(distances_.pieceEnd(pair.stands_s), to_s)};
-      const double held_m = least_m - distances_.arcOf(pair.way, piece);
-      const double here_m = held_m > 0 ? distanceOver(pair, piece, held_m, tolerance_m_ / 2) : 0;
-      const bool holds =
-          held_m > 0 && here_m >= held_m && (here_m >= least_m || isAtLeast({piece.to_s, piece.to_s}, least_m));
-      if (holds) pair.stands_s = piece.to_s;
-      pair.comes_nearer = !holds;
+      // What arcs take off is given back: their ends are on the straight ways, which come no nearer.
+      const Stretch stretch{pair.stands_s, ends.back()};
+      const double held_m = least_m - distances_.arcOf(pair.way, stretch);
+      if (held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_ / 2) >= held_m) {
+        pair.stands_s = stretch.to_s;
+        ends.pop_back();
+      } else if (distances_.pieceEnd(stretch.from_s) < stretch.to_s && mayGoOn(pair)) {
+        ends.push_back(distances_.cutOf(stretch));
+      } else {
+        pair.comes_nearer = true;
+      }
     }
     return pair.stands_s >= to_s;
+  }
+
+  /// D is never more than at the begin: for which time up to `to_s` that is enough.
+  double lastOf(Goal goal, const PathPair& pair, double to_s) const {
+    if (needs(goal, pair, to_s) <= pair.most_m) return to_s;
+    double low_s = 0;
+    for (int i = 0; i < 30; ++i) {
+      const double middle_s = low_s + (to_s - low_s) / 2;
+      (needs(goal, pair, middle_s) <= pair.most_m ? low_s : to_s) = middle_s;
+    }
+    return to_s;
   }
 
   /// The largest time of the path, up to `to_s`, for which the pair holds.
@@ -186,7 +198,9 @@ class Search {
     const bool scales = goal == Goal::SCALE;
     double holds_s = scales ? std::max(pair.allowed_s, pair.leaves_s) : pair.apart_s;
     if (holds_s >= to_s || pair.start_m == 0 || (scales && !pair.may_scale)) return std::min(holds_s, to_s);
-    const double enough_m = needs(goal, pair, to_s);
+    const double last_s = lastOf(goal, pair, to_s);
+    if (last_s < to_s && scales && pair.may_stand && stands(pair, to_s)) return to_s;
+    const double enough_m = needs(goal, pair, last_s);
     if (!std::isfinite(enough_m)) return std::min(holds_s, to_s);
     const double tolerance_m = std::max(tolerance_m_ / 2, enough_m / 100);
     const auto lowest = [&](const Stretch& stretch) {
@@ -194,7 +208,7 @@ class Search {
       return distanceOver(pair, stretch, enough_m + bend_m, tolerance_m) - bend_m;
     };
     double known_s = 0, least_m = SpeedBound::NONE;  // of D
-    std::vector<double> ends{to_s};
+    std::vector<double> ends{last_s};
     while (!ends.empty()) {
       const double end_s = ends.back();
       const double here_m = std::min(least_m, lowest({known_s, end_s}));
@@ -228,18 +242,12 @@ class Search {
   double farthest(Goal goal, double most_s) {
     failing_.reset();
     double holds_s = std::min(most_s, path_.endsAt());
-    // D is never more than it is at the begin.
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       const PathPair& pair = pairs_[p];
       if (goal == Goal::SCALE && pair.may_stand) continue;
-      const double by_bounds_s = goal == Goal::UNTIL ? pair.apart_s : pair.allowed_s;
-      if (by_bounds_s >= holds_s || needs(goal, pair, holds_s) <= pair.most_m) continue;
-      double low_s = 0;
-      for (int i = 0; i < 30; ++i) {
-        const double middle_s = low_s + (holds_s - low_s) / 2;
-        (needs(goal, pair, middle_s) <= pair.most_m ? low_s : holds_s) = middle_s;
-      }
-      holds_s = std::max(by_bounds_s, holds_s);
+      const double allowed_s = std::max(goal == Goal::UNTIL ? pair.apart_s : pair.allowed_s, lastOf(goal, pair, holds_s));
+      if (allowed_s >= holds_s) continue;
+      holds_s = allowed_s;
       failing_ = p;
     }
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
