@@ -1,5 +1,5 @@
-// What an intended path costs a step: the panda beside a cloth of 600 vertices over a map of 50,000 voxels, on a path of
-// 1 s in 20 pieces, far, along the cloth, down onto it, and in touch with it. On one thread, without a budget.
+// What an intended path costs a step: the panda beside a cloth of 600 vertices over a map of 50,000 voxels, on a path
+// of 1 s in 20 pieces, far, along the cloth, down onto it, and in touch with it. On one thread, without a budget.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <ctime>
@@ -29,8 +29,8 @@ double processorMs() {
 
 struct Scene {
   std::string name;
-  double away_m, tips_m;            ///< of the robot; of its fingertips above the map
-  double swing_rad_s, dive_rad_s;   ///< of the first joint; of the fourth, by which the hand goes down
+  double away_m, tips_m;           ///< of the robot; of its fingertips above the map
+  double swing_rad_s, dive_rad_s;  ///< of the first joint; of the fourth, by which the hand goes down
 };
 
 std::vector<double> jointsAt(const Panda& panda, const Scene& scene, double time_s) {
@@ -160,10 +160,11 @@ int main(int argc, char** argv) {
     nlohmann::json rows;
     std::cout << "| the arm | bodies | ms a step | questions | until, s | by bounds | scale | by bounds |\n"
                  "|---|--:|--:|--:|--:|--:|--:|--:|\n";
-    for (const dccd::benchmarks::Scene& scene : {dccd::benchmarks::Scene{"is 3 m away", 3, 0.05, 0.4, 0},
-                                                 dccd::benchmarks::Scene{"goes along at 50 mm", 0, 0.05, 0.4, 0},
-                                                 dccd::benchmarks::Scene{"goes down from 100 mm", 0, 0.1, 0.1, -0.4},
-                                                 dccd::benchmarks::Scene{"rises from the cloth", 0, 0.0025, 0.1, 0.3}}) {
+    for (const dccd::benchmarks::Scene& scene :
+         {dccd::benchmarks::Scene{"is 3 m away", 3, 0.05, 0.4, 0},
+          dccd::benchmarks::Scene{"goes along at 50 mm", 0, 0.05, 0.4, 0},
+          dccd::benchmarks::Scene{"goes down from 100 mm", 0, 0.1, 0.1, -0.4},
+          dccd::benchmarks::Scene{"rises from the cloth", 0, 0.0025, 0.1, 0.3}}) {
       if (scene.name.compare(0, only.size(), only) != 0) continue;
       const nlohmann::json row = dccd::benchmarks::measure(panda, scene, runs);
       rows.push_back(row);

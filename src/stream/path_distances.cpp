@@ -94,7 +94,9 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
 
 Eigen::Isometry3d PathDistances::poseAt(const Way& way, std::size_t piece, double time_s) const {
   const double share = shareAt(piece, time_s);
-  const auto at = [&](const Shape& shape) { return interpolate((*shape.pose)[piece], (*shape.pose)[piece + 1], share); };
+  const auto at = [&](const Shape& shape) {
+    return interpolate((*shape.pose)[piece], (*shape.pose)[piece + 1], share);
+  };
   const Eigen::Isometry3d mover = at(shapes_[way.mover]);
   if (way.still == OBSTACLE_BODY) return outcome_->step->map.map_from_fixed * mover;
   return shapes_[way.still].pose ? at(shapes_[way.still]).inverse() * mover : mover;
@@ -160,12 +162,13 @@ double PathDistances::arcOf(const Way& way, const Stretch& stretch) const {
   return most_m * ABOVE + way.rounding_m;
 }
 
-/// Of the first piece and of the last one it may go a part, so that it is off both chords.
+/// Where a piece is gone in part only, the mover is off its chord.
 double PathDistances::goneBy(const Way& way, const Stretch& stretch) const {
   const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
   double arc_m = 0;
   for (std::size_t k = first; k <= last; ++k) arc_m = std::max(arc_m, way.arc_m[k]);
-  return (way.gone_m[last + 1] - way.gone_m[first] + 2 * arc_m + 2 * way.rounding_m) * ABOVE;
+  const double parts = stretch.from_s > path_->time_s[first] ? 2 : 1;
+  return (way.gone_m[last + 1] - way.gone_m[first] + parts * arc_m + 2 * way.rounding_m) * ABOVE;
 }
 
 /// Between two ends of pieces the way leaves its own chord by the arc, and that chord leaves the stretch's by no more

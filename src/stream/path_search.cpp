@@ -170,7 +170,7 @@ class Search {
       // What arcs take off is given back: their ends are on the straight ways, which come no nearer.
       const Stretch stretch{pair.stands_s, ends.back()};
       const double held_m = least_m - distances_.arcOf(pair.way, stretch);
-      if (held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_ / 2) >= held_m) {
+      if (held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_) >= held_m) {
         pair.stands_s = stretch.to_s;
         ends.pop_back();
       } else if (distances_.pieceEnd(stretch.from_s) < stretch.to_s && mayGoOn(pair)) {
@@ -245,7 +245,8 @@ class Search {
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       const PathPair& pair = pairs_[p];
       if (goal == Goal::SCALE && pair.may_stand) continue;
-      const double allowed_s = std::max(goal == Goal::UNTIL ? pair.apart_s : pair.allowed_s, lastOf(goal, pair, holds_s));
+      const double allowed_s =
+          std::max(goal == Goal::UNTIL ? pair.apart_s : pair.allowed_s, lastOf(goal, pair, holds_s));
       if (allowed_s >= holds_s) continue;
       holds_s = allowed_s;
       failing_ = p;
