@@ -59,9 +59,8 @@ LeavingPlanes::LeavingPlanes(const Outcome& outcome, const PathPair& pair, std::
   radius_m_ = largestRadius(bodies[mover_]) + (on_map ? 0 : largestRadius(bodies[partner_]));
   for (const double time_s : time_s_)
     needed_m_.push_back(pair_.scaleNeeds(pace.scaleOf(time_s), pace) + pair_.separation_m + radius_m_ + rounding_m_);
-  const double most_m = needed_m_.back();
-  all.min().array() -= most_m;
-  all.max().array() += most_m;
+  all.min().array() -= needed_m_.back();
+  all.max().array() += needed_m_.back();
   const auto addNear = [&](const Eigen::AlignedBox3d& box, const Positions& corners) {
     if (all.intersects(box)) features_.push_back({box, corners});
   };
