@@ -147,7 +147,14 @@ set_source_files_properties(test/unit/ros/hostile_input_test.cpp test/unit/ros/i
   test/unit/ros/mesh_file_grammar_test.cpp test/unit/ros/message_grammar_test.cpp
   PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
-# scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.
+# scripts/benchmark path and robot: they need the node's rooms, which the benchmarks' own tree has not; robot FCL, too.
+#catkin_lint: ignore uninstalled_target
+add_executable(path_benchmark EXCLUDE_FROM_ALL benchmark/path_benchmark.cpp benchmark/support/timing.cpp)
+target_include_directories(path_benchmark PRIVATE benchmark test)
+target_include_directories(path_benchmark SYSTEM PRIVATE
+  ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS} ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
+target_link_libraries(path_benchmark PRIVATE deformable_ccd_test_support deformable_ccd_ros GTest::gtest
+  CLI11::CLI11 nlohmann_json::nlohmann_json ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 find_package(fcl QUIET)
 if(fcl_FOUND)
   #catkin_lint: ignore uninstalled_target

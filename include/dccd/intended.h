@@ -74,7 +74,7 @@ struct AlongPath {
   PathContact contact = PathContact::FREE;  ///< of all pairs: the worst
   bool rests_on_path = false;               ///< `until` is later than without one
   std::string unused;                       ///< why the path says nothing; empty: it was used
-  std::size_t searches = 0;                 ///< pieces of which distances were computed
+  std::size_t searches = 0;                 ///< of a pair's distance over a stretch of the path
 };
 
 /// Until when, and how fast, on a path that begins where the step ends.
@@ -105,7 +105,7 @@ struct AlongPath {
 /// behind the plane.
 class DCCD_EXPORT PathSearch {
  public:
-  /// Pieces that are searched for one step, at most; what is left out is not promised.
+  /// Stretches of the path that are searched for one pair, at most; what is left out is not promised.
   static constexpr std::size_t MOST_SEARCHES = 96;
 
   PathSearch();

@@ -6,6 +6,7 @@
 
 #include "dccd/intended.h"
 #include "dccd/mesh_store.h"
+#include "stream/path_distances.h"
 
 namespace dccd {
 namespace {
@@ -16,11 +17,6 @@ bool isLength(double value) { return value >= 0 && std::isfinite(value); }
 std::size_t pieceAt(const IntendedPath& path, double time_s) {
   const auto after = std::upper_bound(path.time_s.begin() + 1, path.time_s.end() - 1, time_s);
   return static_cast<std::size_t>(after - path.time_s.begin()) - 1;
-}
-
-double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
-  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
 }
 
 /// Corners of the box around a body at the step's end: a vertex is off a place by no more than one of them is.
@@ -45,6 +41,11 @@ bool isAllFinite(const Body& body) {
 }
 
 }  // namespace
+
+double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
+  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+}
 
 bool IntendedPath::has(std::uint16_t body) const {
   return std::any_of(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });

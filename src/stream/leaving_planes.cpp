@@ -2,16 +2,13 @@
 #include <cmath>
 
 #include "stream/path_search.h"
+#include "stream/radii.h"
 
 namespace dccd {
 namespace {
 
 constexpr double PLANE_ROUNDING = 1e-12;  // [1] of the largest coordinate: far above what heights are rounded by
 constexpr std::size_t MOST_NORMALS = 8;   // of contacts that are tried
-
-double largestRadius(const Body& body) {
-  return body.radius_m && !body.radius_m->empty() ? *std::max_element(body.radius_m->begin(), body.radius_m->end()) : 0;
-}
 
 double lowest(const Positions& positions, const Vec3& direction) {
   double least = SpeedBound::NONE;
@@ -35,7 +32,6 @@ LeavingPlanes::LeavingPlanes(const Outcome& outcome, const PathPair& pair, std::
       ends_(std::move(ends)),
       leaves_m_(std::move(leaves_m)),
       time_s_(std::move(time_s)),
-      pace_(pace),
       mover_(mover),
       partner_(pair.body[0] == mover ? pair.body[1] : pair.body[0]) {
   const std::vector<Body>& bodies = outcome.step->bodies;
@@ -61,10 +57,10 @@ LeavingPlanes::LeavingPlanes(const Outcome& outcome, const PathPair& pair, std::
   }
   rounding_m_ = PLANE_ROUNDING * largest;
   radius_m_ = largestRadius(bodies[mover_]) + (on_map ? 0 : largestRadius(bodies[partner_]));
-  const double most_m =
-      pair_.scaleNeeds(pace_.scaleOf(time_s_.back()), pace_) + pair_.separation_m + radius_m_ + rounding_m_;
-  all.min().array() -= most_m;
-  all.max().array() += most_m;
+  for (const double time_s : time_s_)
+    needed_m_.push_back(pair_.scaleNeeds(pace.scaleOf(time_s), pace) + pair_.separation_m + radius_m_ + rounding_m_);
+  all.min().array() -= needed_m_.back();
+  all.max().array() += needed_m_.back();
   const auto addNear = [&](const Eigen::AlignedBox3d& box, const Positions& corners) {
     if (all.intersects(box)) features_.push_back({box, corners});
   };
@@ -153,8 +149,7 @@ double LeavingPlanes::untilBy(const Vec3& direction) const {
     double least_m = SpeedBound::NONE;
     for (std::size_t k = 0; k < last && time_s_[k] < until_s; ++k) {
       least_m = std::min(least_m, pieces_[k].exteriorDistance(feature.box));
-      const double needed_m = pair_.scaleNeeds(pace_.scaleOf(time_s_[k + 1]), pace_) + pair_.separation_m + radius_m_;
-      if (least_m >= needed_m + rounding_m_) continue;
+      if (least_m >= needed_m_[k + 1]) continue;
       until_s = time_s_[k];
       break;
     }

@@ -1,15 +1,16 @@
-// What follows from an intended path: pieces of it go through the clearance's engine, the first that may touch is
-// halved.
+// What follows from an intended path: each pair is asked for all of it at once, and piece by piece only where that is
+// not enough; the first piece that may touch is halved.
 #include "stream/path_search.h"
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <sstream>
 #include <utility>
 
 #include "dccd/mesh_store.h"
 #include "step/parts.h"
+#include "step/threads.h"
+#include "stream/path_distances.h"
 
 namespace dccd {
 namespace {
@@ -46,69 +47,35 @@ double PathPair::scaleNeeds(double scale, const PathPace& pace) const {
 
 namespace {
 
-/// Of a pair in a piece of the path [m].
-struct InPiece {
-  double least_m = 0, end_m = 0;  // less the separation, and what the piece bends by
-  double slack_m = 0;  // of least_m: what the bends and the tolerance of distances make of a constant distance
-};
-
 enum class Goal : std::uint8_t { UNTIL, SCALE };
 
 /// One outcome and one path.
 class Search {
  public:
   Search(const Outcome& outcome, const Options& options, const std::vector<SpeedBound>& bounds,
-         const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline, History& history)
+         const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline, PathDistances& distances)
       : outcome_(outcome),
-        options_(options),
         after_(boundsAfter(outcome, bounds)),
         full_(boundsOf(outcome, bounds)),
         law_(law),
-        path_(path),
+        path_(beginningAt(path, *outcome.step)),
         deadline_(deadline),
-        history_(history) {
-    options_.clearance.wanted = true;
-    options_.clearance.self_m = 0;
-    options_.clearance.tolerance_m /= 2;  // so that what stays as it is is told from what comes nearer
-    options_.patches = options_.earliest_only = false;
-    const std::vector<Body>& bodies = outcome.step->bodies;
-    step_ = *outcome.step;
-    step_.off_path.clear();
-    step_.pose_scale = 1;
-    step_.start_ns = outcome.stamp_ns;
-    // Between those that are not on the path nothing is searched.
-    std::vector<std::uint16_t> others;
-    for (std::uint16_t b = 0; b < bodies.size(); ++b)
-      if (!path.has(b)) others.push_back(b);
-    for (std::uint16_t b = 0; b < bodies.size(); ++b) {
-      Body& body = step_.bodies[b];
-      body.waypoints.clear();
-      body.turns = false;
-      body.t0 = body.t1;
-      body.self_collision = false;
-      if (path.has(b)) continue;
-      body.against_obstacle = false;
-      std::vector<std::uint16_t> all;
-      std::set_union(body.not_against.begin(), body.not_against.end(), others.begin(), others.end(),
-                     std::back_inserter(all));
-      all.erase(std::remove(all.begin(), all.end(), b), all.end());
-      body.not_against = std::move(all);
-    }
-    // From where the bodies are.
-    for (IntendedPath::Of& of : beginningAt(path, *outcome.step).bodies) poses_.push_back(std::move(of.pose));
-    whole_.resize(path.bend_m.size());
+        distances_(distances),
+        tolerance_m_(options.clearance.tolerance_m) {
+    distances_.begin(outcome_, path_, deadline_);
     addPairs();
-    limitDistances();
   }
 
   /// `result`: what the bounds alone allow.
   void run(AlongPath& result) {
     findUntil(result);
     if (law_) findScale(result);
-    result.searches = searches_;
+    result.searches = distances_.questions();
   }
 
  private:
+  using Stretch = PathDistances::Stretch;
+
   void addPairs() {
     const Insides insides(outcome_);
     forPairs(outcome_, [&](const Clearance& row, std::size_t number) {
@@ -133,6 +100,7 @@ class Search {
       }
       pair.separation_m = separationOf(outcome_, row);
       pair.start_m = distance_m;
+      pair.most_m = std::max(distance_m, row.at_end.upper_m);
       pair.deviation_m = static_cast<double>(pair.on_path) * path_.deviation_m;
       pair.rate_m_s = static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
       for (const std::uint16_t body : row.body) {
@@ -147,54 +115,12 @@ class Search {
       pair.allowed_s = allowed >= 1 ? SpeedBound::NONE : law_ ? PathPace{*law_}.timeOf(allowed) : 0;
       pair.may_scale = slows && std::isfinite(pair.slowed_m_s) && std::isfinite(pair.other_m_s);
       pair.may_stand = pair.may_scale && pair.other_m_s == 0 && row.at_end.status != ClearanceStatus::UNKNOWN;
-      number_of_[pair.body] = pairs_.size();
-      pairs_.push_back(pair);
+      pair.way = distances_.wayOf(pair.body);
+      pairs_.push_back(std::move(pair));
     });
-  }
-
-  /// What is farther apart than anything is needed is not measured. In powers of 2: other options make much anew.
-  void limitDistances() {
-    const double bend_m = *std::max_element(path_.bend_m.begin(), path_.bend_m.end());
-    double most_m = options_.clearance.tolerance_m;
-    for (const PathPair& pair : pairs_) {
-      double needed_m = pair.untilNeeds(std::min(path_.endsAt(), MOST_PROMISED_S));
-      if (law_) needed_m = std::max(needed_m, pair.scaleNeeds(1, PathPace{*law_}));
-      if (!std::isfinite(needed_m)) continue;
-      most_m = std::max(most_m, (needed_m + 2 * bend_m) * UP + pair.separation_m + 2 * options_.clearance.tolerance_m);
-    }
-    options_.clearance.max_m = std::min(options_.clearance.max_m, std::exp2(std::ceil(std::log2(most_m))));
-  }
-
-  bool holds(Goal goal, const PathPair& pair, const InPiece& in, double time_s) const {
-    const double least_m = std::min(pair.least_m, in.least_m);
-    const bool is_apart = pair.start_m > 0 && least_m > 0;
-    if (goal == Goal::UNTIL) return time_s <= pair.apart_s || (is_apart && pair.untilNeeds(time_s) <= least_m);
-    if (time_s <= pair.allowed_s || time_s <= pair.leaves_s) return true;
-    if (!pair.may_scale) return false;
-    if (is_apart && pair.scaleNeeds(PathPace{*law_}.scaleOf(time_s), PathPace{*law_}) <= least_m) return true;
-    return pair.may_stand && !pair.came_nearer && !comesNearer(pair, in);
-  }
-
-  bool comesNearer(const PathPair& pair, const InPiece& in) const {
-    const double tolerance_m = 2 * options_.clearance.tolerance_m + tolerance::CLEARANCE_RELATIVE * pair.start_m;
-    const double held_m = pair.start_m - tolerance_m - in.slack_m;
-    return !(held_m > 0 && in.least_m >= held_m && in.end_m >= pair.start_m - tolerance_m);
-  }
-
-  bool allHold(Goal goal, const std::vector<InPiece>& in, double time_s) {
-    for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      if (holds(goal, pairs_[p], in[p], time_s)) continue;
-      failing_ = p;
-      return false;
-    }
-    return true;
-  }
-
-  void keep(const std::vector<InPiece>& in) {
-    for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      pairs_[p].came_nearer = pairs_[p].came_nearer || comesNearer(pairs_[p], in[p]);
-      pairs_[p].least_m = std::min(pairs_[p].least_m, in[p].least_m);
-    }
+    // The first ones shorten what the others are asked for.
+    std::stable_sort(pairs_.begin(), pairs_.end(),
+                     [](const PathPair& a, const PathPair& b) { return a.start_m < b.start_m; });
   }
 
   Positions placed(std::size_t of, const Eigen::Isometry3d& pose) const {
@@ -205,91 +131,132 @@ class Search {
     return places;
   }
 
-  /// The distances of all pairs in the part of a piece from one share of it to another one.
-  std::vector<InPiece> measure(std::size_t piece, double from, double to) {
-    std::vector<InPiece> in(pairs_.size());
-    ++searches_;
-    std::vector<double> slack_m(step_.bodies.size(), 0);
-    for (std::size_t i = 0; i < poses_.size(); ++i) {
-      Body& body = step_.bodies[path_.bodies[i].body];
-      const auto at = [&](double share) { return interpolate(poses_[i][piece], poses_[i][piece + 1], share); };
-      const Eigen::Isometry3d begin = from == 0 ? poses_[i][piece] : at(from),
-                              end = to == 1 ? poses_[i][piece + 1] : at(to);
-      body.turns = true;
-      body.pose_t0 = begin;
-      body.pose_t1 = end;
-      body.t0 = share(placed(i, begin));
-      body.t1 = share(placed(i, end));
-      slack_m[path_.bodies[i].body] = path_.bend_m[piece] + leavesWayBy(body, 1, 1);
-    }
-    step_.stamp_ns = step_.start_ns + 1 + nsIn(path_.time_s[piece + 1] - path_.time_s[piece]);
-    const Outcome found = detect(step_, options_, history_, deadline_);
-    forPairs(found, [&](const Clearance& row, std::size_t) {
-      const auto pair = number_of_.find(row.body);
-      if (pair == number_of_.end()) return;
-      const PathPair& of = pairs_[pair->second];
-      InPiece& one = in[pair->second];
-      const double bend_m = static_cast<double>(of.on_path) * path_.bend_m[piece];
-      const auto less = [&](double distance_m, double by_m) {
-        const double rest_m = (distance_m - by_m - of.separation_m) - 1e-12 * distance_m;
-        return std::isfinite(distance_m) && rest_m > 0 ? rest_m : 0;
-      };
-      const auto isKnown = [](const ClearanceDistance& distance) {
-        return distance.status != ClearanceStatus::UNKNOWN && distance.status != ClearanceStatus::TOUCHING;
-      };
-      if (isKnown(row.over_step)) one.least_m = less(row.over_step.lower_m, bend_m);
-      if (isKnown(row.at_end)) one.end_m = less(row.at_end.lower_m, 0);
-      for (const std::uint16_t body : row.body)
-        if (body != OBSTACLE_BODY) one.slack_m += slack_m[body];
-    });
-    return in;
+  double needs(Goal goal, const PathPair& pair, double time_s) const {
+    return goal == Goal::UNTIL ? pair.untilNeeds(time_s)
+                               : pair.scaleNeeds(PathPace{*law_}.scaleOf(time_s), PathPace{*law_});
   }
 
-  bool mayGoOn() const { return searches_ < PathSearch::MOST_SEARCHES && !deadline_.isOver(); }
-
-  const std::vector<InPiece>& wholePiece(std::size_t piece) {
-    std::vector<InPiece>& in = whole_[piece];
-    if (in.empty()) in = measure(piece, 0, 1);
-    return in;
+  bool mayGoOn(const PathPair& pair) const {
+    return pair.asked.size() < PathSearch::MOST_SEARCHES && !deadline_.isOver();
   }
 
-  /// The largest time of the path, up to `most_s`, for which all pairs hold. failing_: which one does not, after it.
-  double farthest(Goal goal, double most_s) {
-    for (PathPair& pair : pairs_) {
-      pair.least_m = SpeedBound::NONE;
-      pair.came_nearer = false;
+  /// What is between the two at least over the stretch, but for bends: by what was asked before, where that is enough,
+  /// or asked now.
+  double distanceOver(PathPair& pair, const Stretch& stretch, double enough_m, double tolerance_m) {
+    double least_m = pair.start_m - distances_.goneBy(pair.way, {0, stretch.to_s});
+    for (const PathPair::Asked& one : pair.asked) {
+      if (one.of.from_s == stretch.from_s && one.of.to_s == stretch.to_s && one.enough_m >= enough_m &&
+          one.tolerance_m <= tolerance_m)
+        return one.least_m;
+      if (one.of.from_s <= stretch.from_s && one.of.to_s >= stretch.to_s) {
+        least_m = std::max(least_m, one.least_m);
+      } else if (one.of.to_s <= stretch.from_s) {
+        least_m = std::max(least_m, one.least_m - distances_.goneBy(pair.way, {one.of.to_s, stretch.to_s}));
+      }
     }
-    failing_.reset();
-    for (std::size_t k = 0; k < path_.bend_m.size(); ++k) {
-      const double begins_s = path_.time_s[k], ends_s = path_.time_s[k + 1], lasts_s = ends_s - begins_s;
-      if (begins_s >= most_s) return most_s;
-      if (whole_[k].empty() && !mayGoOn()) return begins_s;
-      if (allHold(goal, wholePiece(k), std::min(ends_s, most_s))) {
-        keep(whole_[k]);
+    if (least_m >= enough_m || !mayGoOn(pair)) return std::max(0.0, least_m);
+    const double asked_m = enough_m + pair.separation_m;
+    const double found_m = (distances_.over(pair.way, stretch, asked_m, tolerance_m) - pair.separation_m) * (1 - 1e-12);
+    pair.asked.push_back({stretch, enough_m, tolerance_m, std::max({0.0, least_m, found_m})});
+    return pair.asked.back().least_m;
+  }
+
+  /// Whether it is known that nothing of the pair comes nearer up to this time than it is at the begin.
+  bool stands(PathPair& pair, double to_s) {
+    const double least_m = pair.start_m - 2 * tolerance_m_ - tolerance::CLEARANCE_RELATIVE * pair.start_m;
+    // What stays as it is is told from what comes nearer.
+    std::vector<double> ends{to_s};
+    while (pair.stands_s < to_s && !pair.comes_nearer) {
+      // What arcs take off is given back: their ends are on the straight ways, which come no nearer.
+      const Stretch stretch{pair.stands_s, ends.back()};
+      const double held_m = least_m - distances_.arcOf(pair.way, stretch);
+      if (held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_) >= held_m) {
+        pair.stands_s = stretch.to_s;
+        ends.pop_back();
+      } else if (distances_.pieceEnd(stretch.from_s) < stretch.to_s && mayGoOn(pair)) {
+        ends.push_back(distances_.cutOf(stretch));
+      } else {
+        pair.comes_nearer = true;
+      }
+    }
+    return pair.stands_s >= to_s;
+  }
+
+  /// D is never more than at the begin: for which time up to `to_s` that is enough.
+  double lastOf(Goal goal, const PathPair& pair, double to_s) const {
+    if (needs(goal, pair, to_s) <= pair.most_m) return to_s;
+    double low_s = 0;
+    for (int i = 0; i < 30; ++i) {
+      const double middle_s = low_s + (to_s - low_s) / 2;
+      (needs(goal, pair, middle_s) <= pair.most_m ? low_s : to_s) = middle_s;
+    }
+    return to_s;
+  }
+
+  /// The largest time of the path, up to `to_s`, for which the pair holds.
+  double farthest(Goal goal, PathPair& pair, double to_s) {
+    const bool scales = goal == Goal::SCALE;
+    double holds_s = scales ? std::max(pair.allowed_s, pair.leaves_s) : pair.apart_s;
+    if (holds_s >= to_s || pair.start_m == 0 || (scales && !pair.may_scale)) return std::min(holds_s, to_s);
+    const double last_s = lastOf(goal, pair, to_s);
+    if (last_s < to_s && scales && pair.may_stand && stands(pair, to_s)) return to_s;
+    const double enough_m = needs(goal, pair, last_s);
+    if (!std::isfinite(enough_m)) return std::min(holds_s, to_s);
+    const double tolerance_m = std::max(tolerance_m_ / 2, enough_m / 100);
+    const auto lowest = [&](const Stretch& stretch) {
+      const double bend_m = distances_.bendOf(pair.way, stretch);
+      return distanceOver(pair, stretch, enough_m + bend_m, tolerance_m) - bend_m;
+    };
+    double known_s = 0, least_m = SpeedBound::NONE;  // of D
+    std::vector<double> ends{last_s};
+    while (!ends.empty()) {
+      const double end_s = ends.back();
+      const double here_m = std::min(least_m, lowest({known_s, end_s}));
+      if (here_m > 0 && needs(goal, pair, end_s) <= here_m) {
+        least_m = here_m;
+        known_s = end_s;
+        ends.pop_back();
         continue;
       }
-      double low_s = begins_s, high_s = std::min(ends_s, most_s);
-      std::vector<InPiece> in = whole_[k];  // of what is open, or more
-      while (mayGoOn() && high_s - low_s > std::max(OPEN_MS / 1e3, OPEN_PERCENT * low_s / 100)) {
-        const double middle_s = low_s + (high_s - low_s) / 2;
-        const auto half = measure(k, (low_s - begins_s) / lasts_s, (middle_s - begins_s) / lasts_s);
-        if (allHold(goal, half, middle_s)) {
-          keep(half);
-          low_s = middle_s;
-        } else {
-          high_s = middle_s;
-          in = half;
-        }
+      if (known_s == 0 && end_s == to_s && scales && pair.may_stand && stands(pair, to_s)) return to_s;
+      if (mayGoOn(pair) && end_s - known_s > std::max(OPEN_MS / 1e3, OPEN_PERCENT * known_s / 100)) {
+        ends.push_back(distances_.cutOf({known_s, end_s}));
+        continue;
       }
-      // What is needed grows with the time: of what was searched the beginning may hold.
-      for (int i = 0; i < 20; ++i) {
-        const double middle_s = low_s + (high_s - low_s) / 2;
-        (allHold(goal, in, middle_s) ? low_s : high_s) = middle_s;
+      // What is needed grows with the time: of what was asked the beginning may hold.
+      double high_s = end_s;
+      for (int i = 0; i < 20 && here_m > 0; ++i) {
+        const double middle_s = known_s + (high_s - known_s) / 2;
+        (needs(goal, pair, middle_s) <= here_m ? known_s : high_s) = middle_s;
       }
-      allHold(goal, in, high_s);  // says which one does not
-      return low_s;
+      break;
     }
-    return std::min(most_s, path_.endsAt());
+    holds_s = std::max(holds_s, known_s);
+    if (holds_s >= to_s || !scales || !pair.may_stand) return std::min(holds_s, to_s);
+    holds_s = std::max(holds_s, pair.stands_s);
+    if (holds_s < to_s) holds_s = std::max(holds_s, leavesUntil(pair, to_s));
+    return std::min(holds_s, to_s);
+  }
+
+  /// Of all pairs. failing_: which one does not hold after it.
+  double farthest(Goal goal, double most_s) {
+    failing_.reset();
+    double holds_s = std::min(most_s, path_.endsAt());
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      const PathPair& pair = pairs_[p];
+      if (goal == Goal::SCALE && pair.may_stand) continue;
+      const double allowed_s =
+          std::max(goal == Goal::UNTIL ? pair.apart_s : pair.allowed_s, lastOf(goal, pair, holds_s));
+      if (allowed_s >= holds_s) continue;
+      holds_s = allowed_s;
+      failing_ = p;
+    }
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      const double to_s = holds_s;
+      holds_s = farthest(goal, pairs_[p], to_s);
+      if (holds_s < to_s) failing_ = p;
+    }
+    return holds_s;
   }
 
   void findUntil(AlongPath& result) {
@@ -322,12 +289,9 @@ class Search {
     const PathPace pace{*law_};
     const double most_s = std::min(path_.endsAt(), pace.timeOf(1));
     for (PathPair& pair : pairs_) {
-      if (pair.allowed_s >= most_s) continue;
-      const bool touches = pair.start_m == 0;
-      if (pair.may_stand && pair.on_path == 1) pair.leaves_s = leavesUntil(pair, pace, most_s);
-      if (!touches) continue;
-      const PathContact contact =
-          pair.leaves_s > 0 ? PathContact::TOUCHES_AND_LEAVES : PathContact::TOUCHES_AND_APPROACHES;
+      if (pair.allowed_s >= most_s || pair.start_m > 0) continue;
+      const bool leaves = leavesUntil(pair, most_s) > 0;
+      const PathContact contact = leaves ? PathContact::TOUCHES_AND_LEAVES : PathContact::TOUCHES_AND_APPROACHES;
       if (result.contact != PathContact::TOUCHES_AND_APPROACHES) result.contact = contact;
     }
     const double on_path_s = farthest(Goal::SCALE, most_s);
@@ -360,14 +324,16 @@ class Search {
   }
 
   /// By pieces of their own: the box around one that is long and straight is near to much.
-  double leavesUntil(const PathPair& pair, const PathPace& pace, double most_s) const {
+  double leavesUntil(PathPair& pair, double most_s) const {
+    if (!pair.may_stand || pair.on_path != 1 || pair.leaves_s > 0) return pair.leaves_s;
     std::size_t of = 0;
     while (path_.bodies[of].body != pair.body[0] && path_.bodies[of].body != pair.body[1]) ++of;
-    std::vector<Positions> ends{placed(of, poses_[of][0])};
+    std::vector<Positions> ends{placed(of, path_.bodies[of].pose[0])};
     std::vector<double> leaves_m, time_s{0};
-    Body part = step_.bodies[path_.bodies[of].body];
+    Body part = outcome_.step->bodies[path_.bodies[of].body];
+    part.waypoints.clear();
     part.turns = true;
-    part.pose_t1 = poses_[of][0];
+    part.pose_t1 = path_.bodies[of].pose[0];
     for (std::size_t k = 0; k < path_.bend_m.size() && time_s.back() < most_s; ++k) {
       const double begins_s = path_.time_s[k], lasts_s = std::min(path_.time_s[k + 1], most_s) - begins_s;
       const double count = std::ceil(PLANE_PIECES * lasts_s / most_s);
@@ -375,38 +341,30 @@ class Search {
         time_s.push_back(begins_s + i / count * lasts_s);
         const double u = (time_s.back() - begins_s) / (path_.time_s[k + 1] - begins_s);
         part.pose_t0 = part.pose_t1;
-        part.pose_t1 = interpolate(poses_[of][k], poses_[of][k + 1], std::min(u, 1.0));
+        part.pose_t1 = interpolate(path_.bodies[of].pose[k], path_.bodies[of].pose[k + 1], std::min(u, 1.0));
         part.t0 = share(ends.back());
         ends.push_back(placed(of, part.pose_t1));
         part.t1 = share(ends.back());
         leaves_m.push_back(path_.bend_m[k] + leavesWayBy(part, 1, 1));
       }
     }
-    return LeavingPlanes(outcome_, pair, path_.bodies[of].body, std::move(ends), std::move(leaves_m), std::move(time_s),
-                         pace)
-        .until();
+    pair.leaves_s = LeavingPlanes(outcome_, pair, path_.bodies[of].body, std::move(ends), std::move(leaves_m),
+                                  std::move(time_s), PathPace{*law_})
+                        .until();
+    return pair.leaves_s;
   }
 
   const Outcome& outcome_;
-  Options options_;
-  std::vector<SpeedBound> after_, full_;
-  std::optional<SpeedLaw> law_;
-  const IntendedPath& path_;
-  Deadline deadline_;
-  History& history_;
-  Step step_;
-  std::vector<std::vector<Eigen::Isometry3d>> poses_;  // as path_.bodies, from where these are
+  const std::vector<SpeedBound> after_, full_;
+  const std::optional<SpeedLaw> law_;
+  const IntendedPath path_;  // from where the bodies are
+  const Deadline deadline_;
+  PathDistances& distances_;
+  const double tolerance_m_;  // of distances that the step has
   std::vector<PathPair> pairs_;
-  std::map<std::array<std::uint16_t, 2>, std::size_t> number_of_;
-  std::vector<std::vector<InPiece>> whole_;  // by piece; empty: not searched
   std::optional<std::size_t> failing_;
-  std::size_t searches_ = 0;
   double off_path_s_ = MOST_PROMISED_S, itself_s_ = MOST_PROMISED_S, off_path_scale_ = 1;
 };
-
-}  // namespace
-
-namespace {
 
 /// A path that breaks a bound says that one of the two is wrong. Empty: it breaks none.
 std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bounds, const IntendedPath& path) {
@@ -436,7 +394,7 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
 }  // namespace
 
 struct PathSearch::Impl {
-  History history;
+  PathDistances distances;
 };
 
 PathSearch::PathSearch() : impl_(std::make_unique<Impl>()) {}
@@ -446,6 +404,7 @@ PathSearch& PathSearch::operator=(PathSearch&& other) noexcept = default;
 
 AlongPath PathSearch::run(const Outcome& outcome, const Options& options, const std::vector<SpeedBound>& bounds,
                           const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline) {
+  const ScopedFloatMode mode;
   AlongPath result;
   result.until = safeUntil(outcome, bounds);
   if (law) result.scale = speedScale(outcome, bounds, *law);
@@ -453,7 +412,7 @@ AlongPath PathSearch::run(const Outcome& outcome, const Options& options, const 
   if (result.unused.empty()) result.unused = problemOf(path, outcome.step->bodies);
   if (!result.unused.empty()) return result;
   result.unused = whyTooFast(outcome, boundsOf(outcome, bounds), path);
-  if (result.unused.empty()) Search(outcome, options, bounds, law, path, deadline, impl_->history).run(result);
+  if (result.unused.empty()) Search(outcome, options, bounds, law, path, deadline, impl_->distances).run(result);
   return result;
 }
 

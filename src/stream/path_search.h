@@ -7,6 +7,7 @@
 
 #include "dccd/intended.h"
 #include "stream/pairs_ahead.h"
+#include "stream/path_distances.h"
 
 namespace dccd {
 
@@ -22,7 +23,7 @@ struct PathPair {
   std::array<std::uint16_t, 2> body{};
   std::size_t number = SafeUntil::NO_PAIR;  ///< its row in the outcome
   double separation_m = 0;
-  double start_m = 0;                    ///< distanceOf() at the path's begin
+  double start_m = 0, most_m = 0;        ///< distanceOf() at the path's begin, at least and at most
   std::size_t on_path = 0;               ///< how many of the two
   double deviation_m = 0, rate_m_s = 0;  ///< of all that are on it together
   // Of what is not on it [m/s]: until the next frame, and at full speed of what slows down and of what does not.
@@ -32,9 +33,15 @@ struct PathPair {
   bool may_scale = false;  ///< what is on the path slows down, and the other one has a bound
   bool may_stand = false;  ///< the standing rule is for it
   double leaves_s = 0;     ///< up to then it leaves what it touches
-  // Of the path as far as it was searched.
-  double least_m = SpeedBound::NONE;
-  bool came_nearer = false;
+  PathDistances::Way way;
+  struct Asked {
+    PathDistances::Stretch of;
+    double enough_m = 0, tolerance_m = 0;  ///< what was asked for
+    double least_m = 0;                    ///< what is between the two, at least
+  };
+  std::vector<Asked> asked;
+  double stands_s = 0;        ///< up to then it comes no nearer than it is at the begin,
+  bool comes_nearer = false;  ///< and afterwards it does, or nobody knows
 
   /// g(t) of the theorem, rounded up.
   double untilNeeds(double ahead_s) const;
@@ -65,7 +72,7 @@ class LeavingPlanes {
   std::vector<Positions> ends_;
   std::vector<double> leaves_m_;
   std::vector<double> time_s_;
-  PathPace pace_;
+  std::vector<double> needed_m_;  // at each of these
   std::uint16_t mover_, partner_;
   Eigen::Isometry3d to_map_ = Eigen::Isometry3d::Identity();  // the frame in which all of this is
   std::vector<Eigen::AlignedBox3d> pieces_;                   // around the body, wider by what the piece leaves its way

@@ -1,0 +1,214 @@
+#include "stream/path_distances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dccd/mesh_store.h"
+#include "stream/radii.h"
+
+namespace dccd {
+namespace {
+
+constexpr double LARGEST_M = 1e100;  // [m] guard: squares stay finite
+constexpr double ABOVE = 1 + 1e-12;  // [1] more than a few roundings take
+
+double largestOf(const Vec3& v) { return v.cwiseAbs().maxCoeff(); }
+
+}  // namespace
+
+void PathDistances::begin(const Outcome& outcome, const IntendedPath& path, const Deadline& deadline) {
+  outcome_ = &outcome;
+  path_ = &path;
+  deadline_ = deadline;
+  questions_ = 0;
+  shapes_.resize(outcome.step->bodies.size());
+  for (Shape& shape : shapes_) shape.is_known = false;
+  if (outcome.obstacle) map_.set(outcome.obstacle);
+}
+
+std::size_t PathDistances::pieceAt(double time_s) const {
+  const std::vector<double>& times = path_->time_s;
+  return static_cast<std::size_t>(std::upper_bound(times.begin() + 1, times.end() - 1, time_s) - times.begin()) - 1;
+}
+
+std::size_t PathDistances::lastPieceOf(const Stretch& stretch) const {
+  std::size_t last = pieceAt(stretch.from_s);
+  while (path_->time_s[last + 1] < stretch.to_s) ++last;
+  return last;
+}
+
+double PathDistances::shareAt(std::size_t piece, double time_s) const {
+  const double begins_s = path_->time_s[piece], ends_s = path_->time_s[piece + 1];
+  return std::clamp((time_s - begins_s) / (ends_s - begins_s), 0.0, 1.0);
+}
+
+double PathDistances::cutOf(const Stretch& stretch) const {
+  const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
+  return last > first ? path_->time_s[first + (last - first + 1) / 2]
+                      : stretch.from_s + (stretch.to_s - stretch.from_s) / 2;
+}
+
+/// What holds of the mesh is learnt once, what holds of the path with each outcome.
+PathDistances::Shape& PathDistances::known(std::uint16_t number) {
+  Shape& one = shapes_[number];
+  if (one.is_known) return one;
+  const Body& body = outcome_->step->bodies[number];
+  Body& setup = one.setup.setup;
+  if (setup.topology != body.topology || setup.vertex_mask != body.vertex_mask) {
+    one = Shape();
+    setup.topology = body.topology;
+    setup.vertex_mask = body.vertex_mask;
+    one.setup.slot_vertex.assign(body.topology->usedVertices().begin(), body.topology->usedVertices().end());
+    if (!body.vertex_mask.empty()) one.setup.asked.assign(body.topology->vertexCount(), 1);
+    for (const Index v : body.vertex_mask) one.setup.asked[v] = 0;
+    one.moving.build(one.setup, *body.t1);
+    one.still = one.moving;
+  }
+  one.is_known = true;
+  one.pose = nullptr;
+  for (const IntendedPath::Of& of : path_->bodies)
+    if (of.body == number) one.pose = &of.pose;
+  const Eigen::Isometry3d to_local = one.pose ? body.pose_t1.inverse() : Eigen::Isometry3d::Identity();
+  Eigen::AlignedBox3d box(Vec3::Zero());
+  box.setEmpty();
+  one.local.clear();
+  one.rest.clear();
+  one.reach_m = one.out_m = 0;
+  for (const Index v : one.setup.slot_vertex) {
+    const bool is_asked = one.setup.asked.empty() || one.setup.asked[v];
+    const Vec3 p = is_asked ? Vec3(to_local * (*body.t1)[v]) : Vec3(Vec3::Zero());
+    one.local.push_back(p);
+    one.rest.push_back({{p[0], p[1], p[2], 0}, {p[0], p[1], p[2], 0}});
+    if (is_asked) box.extend(p);
+    one.reach_m = std::max(one.reach_m, p.norm());
+  }
+  for (std::size_t i = 0; i < one.corners.size(); ++i)
+    one.corners[i] = box.isEmpty() ? Vec3(Vec3::Zero()) : box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+  for (std::size_t k = 0; one.pose && k < one.pose->size(); ++k)
+    one.out_m = std::max(one.out_m, largestOf((*one.pose)[k].translation()));
+  one.radius_m = largestRadius(body);
+  one.still.refit(one.rest.data());
+  return one;
+}
+
+Eigen::Isometry3d PathDistances::poseAt(const Way& way, std::size_t piece, double time_s) const {
+  const double share = shareAt(piece, time_s);
+  const auto at = [&](const Shape& shape) {
+    return interpolate((*shape.pose)[piece], (*shape.pose)[piece + 1], share);
+  };
+  const Eigen::Isometry3d mover = at(shapes_[way.mover]);
+  if (way.still == OBSTACLE_BODY) return outcome_->step->map.map_from_fixed * mover;
+  return shapes_[way.still].pose ? at(shapes_[way.still]).inverse() * mover : mover;
+}
+
+/// In a frame that turns evenly by w, and whose origin goes straight, a vertex that is x from that origin and has the
+/// velocity v against it goes by its own acceleration - 2 w v + w w x, all per piece. Its own is angle^2 r. A way whose
+/// second derivative is at most K along any direction leaves its chord by no more than K / 8.
+PathDistances::Way PathDistances::wayOf(const std::array<std::uint16_t, 2>& body) {
+  Way way;
+  way.mover = body[0];
+  way.still = body[1];
+  const bool with_map = way.still == OBSTACLE_BODY;
+  if (!with_map) {
+    const Shape &first = known(way.mover), &second = known(way.still);
+    if (!first.pose || (second.pose && second.reach_m < first.reach_m)) std::swap(way.mover, way.still);
+  }
+  const Shape& mover = known(way.mover);
+  const Shape* const still = with_map ? nullptr : &known(way.still);
+  const bool both = still && still->pose;
+  way.bends = both ? 2 : 1;
+  const double out_m = mover.reach_m + mover.out_m + (still ? still->reach_m + still->out_m : 0) +
+                       (with_map ? largestOf(outcome_->step->map.map_from_fixed.translation()) : 0);
+  way.rounding_m = out_m < LARGEST_M ? tolerance::CLEARANCE * out_m : SpeedBound::NONE;
+  way.gone_m.push_back(0);
+  way.pose.push_back(poseAt(way, 0, 0));
+  for (std::size_t k = 0; k < path_->bend_m.size(); ++k) {
+    way.pose.push_back(poseAt(way, k, path_->time_s[k + 1]));
+    const auto from = [&](const Shape& shape) -> const Eigen::Isometry3d& { return (*shape.pose)[k]; };
+    const auto to = [&](const Shape& shape) -> const Eigen::Isometry3d& { return (*shape.pose)[k + 1]; };
+    const double turn = angleBetween(from(mover), to(mover));
+    double bends = turn * turn * mover.reach_m;
+    if (both) {
+      const double frame = angleBetween(from(*still), to(*still));
+      const Vec3 begin = from(mover).translation() - from(*still).translation(),
+                 end = to(mover).translation() - to(*still).translation();
+      bends += 2 * frame * ((end - begin).norm() + turn * mover.reach_m) +
+               frame * frame * (std::max(begin.norm(), end.norm()) + mover.reach_m);
+    }
+    way.arc_m.push_back(bends / 8);
+    double chord_m = 0;
+    for (const Vec3& corner : mover.corners)
+      chord_m = std::max(chord_m, (way.pose[k + 1] * corner - way.pose[k] * corner).norm());
+    way.gone_m.push_back(way.gone_m.back() + chord_m);
+  }
+  return way;
+}
+
+double PathDistances::bendOf(const Way& way, const Stretch& stretch) const {
+  if (!(stretch.from_s < stretch.to_s)) return 0;
+  double most_m = 0;
+  for (std::size_t k = pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k)
+    most_m = std::max(most_m, path_->bend_m[k]);
+  return way.bends * most_m;
+}
+
+double PathDistances::arcOf(const Way& way, const Stretch& stretch) const {
+  double most_m = 0;
+  for (std::size_t k = pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k) {
+    const double share = shareAt(k, stretch.to_s) - shareAt(k, stretch.from_s);
+    most_m = std::max(most_m, way.arc_m[k] * share * share);
+  }
+  return most_m * ABOVE + way.rounding_m;
+}
+
+/// Where a piece is gone in part only, the mover is off its chord.
+double PathDistances::goneBy(const Way& way, const Stretch& stretch) const {
+  const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
+  double arc_m = 0;
+  for (std::size_t k = first; k <= last; ++k) arc_m = std::max(arc_m, way.arc_m[k]);
+  const double parts = stretch.from_s > path_->time_s[first] ? 2 : 1;
+  return (way.gone_m[last + 1] - way.gone_m[first] + parts * arc_m + 2 * way.rounding_m) * ABOVE;
+}
+
+/// Between two ends of pieces the way leaves its own chord by the arc, and that chord leaves the stretch's by no more
+/// than its two ends do: a place is affine in the vertex, so of all vertices a corner of their box leaves it most.
+/// Returns by how much [m].
+double PathDistances::place(const Way& way, const Stretch& stretch) {
+  Shape& mover = shapes_[way.mover];
+  const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
+  const Eigen::Isometry3d from = poseAt(way, first, stretch.from_s), to = poseAt(way, last, stretch.to_s);
+  double off_m = 0;
+  for (std::size_t k = first + 1; k <= last; ++k) {
+    const double u = (path_->time_s[k] - stretch.from_s) / (stretch.to_s - stretch.from_s);
+    for (const Vec3& c : mover.corners)
+      off_m = std::max(off_m, (way.pose[k] * c - ((1 - u) * (from * c) + u * (to * c))).norm());
+  }
+  mover.motion.resize(mover.local.size());
+  for (std::size_t i = 0; i < mover.local.size(); ++i) {
+    const Vec3 p = from * mover.local[i], q = to * mover.local[i];
+    mover.motion[i] = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
+  }
+  mover.moving.refit(mover.motion.data());
+  return off_m * ABOVE + arcOf(way, stretch);
+}
+
+double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {
+  const bool with_map = way.still == OBSTACLE_BODY;
+  if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;
+  const FeatureTree& tree = shapes_[way.mover].moving;
+  const bool known = with_map ? outcome_->obstacle != nullptr : !shapes_[way.still].still.empty();
+  if (!known || tree.empty() || !std::isfinite(way.rounding_m)) return 0;
+  ++questions_;
+  const double taken_m =
+      place(way, stretch) + shapes_[way.mover].radius_m + (with_map ? 0 : shapes_[way.still].radius_m);
+  const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_, nullptr};
+  const auto never = [](std::uint32_t, std::uint32_t) { return true; };  // is asked of what is at the end alone
+  const NearestSearch::AllPairs all;
+  const FoundDistance found = with_map ? search_.run(tree, map_, all, goal, {}, never)
+                                       : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
+  const double rest_m = found.lower_m - taken_m - (ABOVE - 1) * found.lower_m;
+  return rest_m > 0 ? rest_m : 0;
+}
+
+}  // namespace dccd
