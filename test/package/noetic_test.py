@@ -22,7 +22,8 @@ NEW_KEYWORDS = {'zip': {'strict'}, 'dataclass': {'slots', 'kw_only'}, 'ArgumentP
                 'extractall': {'filter'}, 'rmtree': {'onexc'}, 'glob': {'root_dir', 'include_hidden'}, 'shutdown': {'cancel_futures'}}
 GENERIC = {'list', 'dict', 'tuple', 'set', 'frozenset', 'type'}
 
-# CMake's later commands and arguments, by what they look like.
+# CMake's later commands and arguments, by what they look like. REQUIRED of find_library and find_path is not among them: 3.16 takes the word
+# for one more place to look at, and ends the configuration all the same where what was not found is used.
 NEW_CMAKE = [r'\bblock\s*\(', r'\bcmake_language\s*\(', r'\bcmake_path\s*\(', r'\bcmake_file_api\s*\(', r'\bstring\s*\(\s*(JSON|HEX)\b', r'\bZIP_LISTS\b',
              r'\bfile\s*\(\s*(ARCHIVE_CREATE|ARCHIVE_EXTRACT|CHMOD|CONFIGURE|COPY_FILE|REAL_PATH|RPATH_\w+)\b', r'\bCOMMAND_ERROR_IS_FATAL\b', r'\bFILE_SET\b',
              r'\breturn\s*\(\s*PROPAGATE\b', r'\bRUNTIME_DEPENDENCIES\b', r'\bRUNTIME_DEPENDENCY_SET\b', r'\bIMPORTED_RUNTIME_ARTIFACTS\b',
