@@ -10,7 +10,7 @@ foreach(library deformable_ccd_octomap deformable_ccd_ros)
   endif()
 endforeach()
 
-# The core counts the versions of its own interface (core.cmake). Before 1.0 each minor version may change that of the others.
+# The core counts the versions of its own interface (core.cmake). Headers of the others are not installed: each minor version may change them.
 set(NODE_LIBRARIES ${LIBRARY_TARGETS})
 list(REMOVE_ITEM NODE_LIBRARIES deformable_ccd)
 if(NODE_LIBRARIES)
@@ -25,7 +25,7 @@ if(DEFORMABLE_CCD_CORE_ONLY)
   install(DIRECTORY include/dccd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
   set(CONFIG_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/${PROJECT_NAME})
   install(EXPORT ${PROJECT_NAME} NAMESPACE ${PROJECT_NAME}:: FILE ${PROJECT_NAME}-targets.cmake DESTINATION ${CONFIG_DIR})
-  write_basic_package_version_file(${PROJECT_NAME}-config-version.cmake COMPATIBILITY SameMinorVersion)
+  write_basic_package_version_file(${PROJECT_NAME}-config-version.cmake COMPATIBILITY SameMajorVersion)
   # Generated here, and no catkin package's.
   #catkin_lint: ignore_once missing_file wrong_install_destination
   install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake cmake/${PROJECT_NAME}-config.cmake

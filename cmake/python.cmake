@@ -33,6 +33,12 @@ endif()
 set_target_properties(deformable_ccd_python PROPERTIES
   CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON OUTPUT_NAME _dccd
   LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/python_module)
+# What scripts/wheel says of the wheel. pybind11 knows the types of numpy 2 from 2.12 on.
+set(NUMPY_BOUND ">=1.17")
+if(pybind11_VERSION VERSION_LESS 2.12)
+  string(APPEND NUMPY_BOUND ",<2")
+endif()
+configure_file(python/METADATA.in ${CMAKE_CURRENT_BINARY_DIR}/python_module/METADATA @ONLY)
 # CMake makes output folders before anything is built, and an empty one is a module to Python, without anything in it.
 add_custom_command(TARGET deformable_ccd_python POST_BUILD
   COMMAND ${CMAKE_COMMAND} -E make_directory ${PYTHON_FOLDER}

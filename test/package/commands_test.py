@@ -38,6 +38,8 @@ NOT_RUN = {
     'scripts/benchmark': 'takes half an hour of a quiet machine',
     'scripts/test': 'is what runs this test; --fresh and --long are run by hand',
     'scripts/pictures': 'needs a browser and RViz, and takes minutes',
+    'scripts/wheel': 'installs packages and takes minutes; wheel_test.py does it',
+    'python3 -m venv': 'is for what scripts/wheel makes; wheel_test.py does it',
     'scripts/package': 'installs packages and takes minutes; deb_test.py does it',
     'apt': 'installs or removes what scripts/package makes; deb_test.py does it',
     'scripts/build': 'was run before this test, or there would be nothing to test',

@@ -1,4 +1,4 @@
-"""The Dockerfiles: each line is run in a bare root in a container's place, and what the images start answers there."""
+"""The Dockerfiles: each line of those on Debian is run in a bare root in a container's place, and what the images start answers there."""
 import json
 import os
 import pathlib
@@ -12,7 +12,7 @@ from checkout import CHECKOUT
 from bare_root import BareRoot, CannotMake, checkout_files
 from ros_process import free_port
 
-MONITOR, DEMO = CHECKOUT / 'docker/Dockerfile', CHECKOUT / 'docker/demo.Dockerfile'
+MONITOR, DEMO, NOETIC = (CHECKOUT / 'docker' / name for name in ('Dockerfile', 'demo.Dockerfile', 'noetic.Dockerfile'))
 DISPLAY = ':%d' % (os.getpid() % 10000 + 100)
 # As in Debian's own images: no waiting for the disk; and what the slim one does not unpack.
 DPKG = 'force-unsafe-io\n'
@@ -103,14 +103,14 @@ class LinesTest(unittest.TestCase):
     """What linters of Dockerfiles ask for."""
 
     def test_lines(self):
-        for path in (MONITOR, DEMO):
+        for path in (MONITOR, DEMO, NOETIC):
             found = instructions(path)
             self.assertEqual(found[0][0], 'FROM')
             self.assertEqual(found[-1][0], 'CMD')
             self.assertIsInstance(json.loads(found[-1][1]), list)  # no shell between the container and its program
             for word, rest in found:
                 with self.subTest('%s: %s %s' % (path.name, word, rest)):
-                    self.assertIn(word, ('FROM', 'ENV', 'WORKDIR', 'COPY', 'RUN', 'CMD'))
+                    self.assertIn(word, ('FROM', 'ENV', 'WORKDIR', 'COPY', 'RUN', 'ENTRYPOINT', 'CMD'))
                     if word == 'FROM':
                         self.assertRegex(rest, r'^\w+:(?!latest)\S+')
                     if 'apt-get' in rest:

@@ -199,6 +199,12 @@ class SetupTest(Machine):
             self.expect_one_line(self.setup_script(MISSING='', **variables), other)
         self.assertEqual(self.calls(), [])
 
+    def test_a_wheel_takes_nothing_of_ros_and_no_other_ros_is_in_its_way(self):
+        ran = self.setup_script('--wheel', '--list', MISSING='patchelf catkin rviz', CMAKE_PREFIX_PATH=self.other_ros())
+        self.assertEqual((ran.returncode, ran.stdout.split()), (0, ['patchelf']))
+        self.assertEqual(self.setup_script('--wheel', MISSING='patchelf', CMAKE_PREFIX_PATH=str(self.folder / 'opt/ros/noetic')).returncode, 0)
+        self.assertTrue(self.installing_calls())
+
     def test_ros_2_is_sourced(self):
         other = self.other_ros('humble', 'rclcpp')
         self.expect_one_line(self.setup_script(AMENT_PREFIX_PATH=other), other, 'does not mix')
