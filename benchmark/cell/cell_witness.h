@@ -94,7 +94,8 @@ class Witness {
     out["map_age_s"] = sorted(map_ages_);
     out["latency_ms"] = sorted(latencies_ms_);
     out["step_ms"] = sorted(steps_ms_);
-    for (const auto& [name, ms] : stages_ms_) out["stages_ms"][name] = sorted(ms);  // own_voxels: the telling of a map, beside the steps
+    for (const auto& [name, ms] : stages_ms_)
+      out["stages_ms"][name] = sorted(ms);  // own_voxels: the telling of a map, beside the steps
     out["reasons"] = reasons_;
     out["scale_reasons"] = scale_reasons_;
     out["last"] = last_;

@@ -49,11 +49,15 @@ DCCD_EXPORT void addPieces(const PosesAt& poses, double until_s, double accelera
 struct PlaceOnPath {
   double time_s = 0;
   double off_m = SpeedBound::NONE;  ///< no vertex is further from where it would be then
+  double last_s = 0;                ///< at no later time are all within within_m of where they would be
 };
-/// The place between these times that is nearest to where the step ends. Its bodies need not be rigid.
-DCCD_EXPORT PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_s, double to_s);
-/// The rest of a path from a time on; time_s begins with 0 again.
-DCCD_EXPORT IntendedPath restOf(const IntendedPath& path, double from_s);
+/// The place between these times that is nearest to where the step ends: of the first stretch on which all vertices are
+/// within within_m [m] of it, if there is one. Its bodies need not be rigid.
+DCCD_EXPORT PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_s, double to_s,
+                                    double within_m = 0);
+/// The rest of a path from a time on, for lasts_s [s] at the most; time_s begins with 0 again. Who is at from_s may
+/// already be as far as by_s: the way to there takes no time to speak of.
+DCCD_EXPORT IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double lasts_s);
 
 /// The same way from where the step has the bodies.
 DCCD_EXPORT IntendedPath beginningAt(const IntendedPath& path, const Step& step);

@@ -236,8 +236,8 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
     addPieces(poses, end_s - from_s, acceleration, reach_m, bend_m_, MOST_PIECES, path);
   }
   if (!problemOf(path, step.bodies).empty()) return std::nullopt;
-  const PlaceOnPath place = placeOnPath(path, step, 0, now_s - from_s);
   const double allowed_m = path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.passed_ns), step.stamp_ns));
+  const PlaceOnPath place = placeOnPath(path, step, 0, now_s - from_s, allowed_m);
   if (!(place.off_m <= allowed_m)) {
     drop(clause("does not hold: the robot is ", place.off_m, " m off it, and ", allowed_m,
                 " m are allowed (intent/deviation_m)"));
@@ -245,7 +245,9 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
   }
   motion.passed_s = from_s + place.time_s;
   motion.passed_ns = step.stamp_ns;
-  return restOf(path, place.time_s);
+  // A robot that has fallen behind goes on by its motion only until the next one begins, or this one was to end.
+  const StampNs end_ns = motions_.size() > 1 ? std::min(motion.endNs(), motions_[1].begin_ns) : motion.endNs();
+  return restOf(path, place.time_s, place.last_s, std::min(limits_.horizon_s, secondsBetween(step.stamp_ns, end_ns)));
 }
 
 /// Each until the next one begins. A constant twist turns about one axis of space and slides along it.

@@ -106,16 +106,35 @@ void addPieces(const PosesAt& poses, double until_s, double acceleration_m_s2, d
   }
 }
 
-PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_s, double to_s) {
+/// Between which shares of the way the point is within so far of `to`; the first is more than the second: nowhere.
+static void limitToBall(const Vec3& from, const Vec3& way, const Vec3& to, double radius_m, double& least,
+                        double& most) {
+  const Vec3 off = from - to;
+  const double a = way.squaredNorm(), b = way.dot(off), c = off.squaredNorm() - radius_m * radius_m;
+  const double root = b * b - a * c;
+  if (a > 0 ? root < 0 : c > 0) {
+    most = least - 1;
+  } else if (a > 0) {
+    least = std::max(least, (-b - std::sqrt(root)) / a);
+    most = std::min(most, (-b + std::sqrt(root)) / a);
+  }
+}
+
+PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_s, double to_s, double within_m) {
   PlaceOnPath best;
   if (!problemOf(path, step.bodies).empty()) return best;
+  constexpr double ROUNDING = 1 + 1e-9;
   to_s = std::clamp(to_s, 0.0, path.endsAt());
   from_s = std::clamp(from_s, 0.0, to_s);
   std::vector<BoxCorners> corners;
   for (const IntendedPath::Of& of : path.bodies) corners.push_back(boxCornersOf(step.bodies[of.body]));
+  bool is_found = false, is_left = false;  // a stretch that is near enough
   for (std::size_t k = pieceAt(path, from_s); k + 1 < path.time_s.size(); ++k) {
     const double begins_s = path.time_s[k], lasts_s = path.time_s[k + 1] - begins_s;
     if (begins_s > to_s) break;
+    const double least = std::max(0.0, (from_s - begins_s) / lasts_s),
+                 most = std::min(1.0, (to_s - begins_s) / lasts_s);
+    double near_from = least, near_to = most;
     double along = 0, way_sq = 0;  // of the least sum of squares on the chords
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const std::vector<Eigen::Isometry3d>& pose = path.bodies[i].pose;
@@ -123,11 +142,12 @@ PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_
         const Vec3 from = pose[k] * corners[i].local[c], way = pose[k + 1] * corners[i].local[c] - from;
         along += way.dot(corners[i].now[c] - from);
         way_sq += way.squaredNorm();
+        limitToBall(from, way, corners[i].now[c], (within_m + path.bend_m[k]) * ROUNDING, near_from, near_to);
       }
     }
-    const double least = std::max(0.0, (from_s - begins_s) / lasts_s),
-                 most = std::min(1.0, (to_s - begins_s) / lasts_s);
-    const double u = std::clamp(way_sq > 0 ? along / way_sq : most, least, most);
+    const bool is_near = near_from <= near_to;
+    const double u =
+        std::clamp(way_sq > 0 ? along / way_sq : most, is_near ? near_from : least, is_near ? near_to : most);
     double off_sq = 0;
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Eigen::Isometry3d pose = interpolate(path.bodies[i].pose[k], path.bodies[i].pose[k + 1], u);
@@ -135,28 +155,45 @@ PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_
         off_sq = std::max(off_sq, (pose * corners[i].local[c] - corners[i].now[c]).squaredNorm());
     }
     const double off_m = std::sqrt(off_sq) + path.bend_m[k];
-    if (off_m < best.off_m) best = {begins_s + u * lasts_s, off_m};
+    is_left = is_left || (is_found && (!is_near || near_from > least));
+    const bool is_first = !is_found && off_m <= within_m;
+    if (is_first || (!is_left && off_m < best.off_m)) {
+      best.time_s = begins_s + u * lasts_s;
+      best.off_m = off_m;
+    }
+    is_found = is_found || is_first;
+    if (is_near) best.last_s = begins_s + near_to * lasts_s;
   }
+  best.last_s = std::max(best.last_s, best.time_s);
   return best;
 }
 
-IntendedPath restOf(const IntendedPath& path, double from_s) {
+IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double lasts_s) {
+  constexpr double NO_TIME_S = 1e-9;  // of a piece
   IntendedPath rest;
   rest.deviation_m = path.deviation_m;
   rest.deviation_rate_m_s = path.deviation_rate_m_s;
   for (const IntendedPath::Of& of : path.bodies) rest.bodies.push_back({of.body, {}});
-  if (path.time_s.size() < 2 || !(from_s < path.endsAt())) return rest;
   from_s = std::max(0.0, from_s);
-  const std::size_t first = pieceAt(path, from_s);
-  const double share = (from_s - path.time_s[first]) / (path.time_s[first + 1] - path.time_s[first]);
-  rest.time_s.push_back(0);
-  for (std::size_t k = first + 1; k < path.time_s.size(); ++k) rest.time_s.push_back(path.time_s[k] - from_s);
-  rest.bend_m.assign(path.bend_m.begin() + static_cast<std::ptrdiff_t>(first), path.bend_m.end());
-  for (std::size_t i = 0; i < path.bodies.size(); ++i) {
-    const std::vector<Eigen::Isometry3d>& pose = path.bodies[i].pose;
-    rest.bodies[i].pose.push_back(interpolate(pose[first], pose[first + 1], share));
-    rest.bodies[i].pose.insert(rest.bodies[i].pose.end(), pose.begin() + static_cast<std::ptrdiff_t>(first) + 1,
-                               pose.end());
+  by_s = std::max(from_s, by_s);
+  const double until_s = std::min(path.endsAt(), by_s + lasts_s);
+  if (path.time_s.size() < 2 || !(from_s < until_s)) return rest;
+  std::vector<double> cuts{from_s, by_s, until_s};
+  for (const double time_s : path.time_s) {
+    if (time_s > from_s && time_s < until_s) cuts.push_back(time_s);
+  }
+  std::sort(cuts.begin(), cuts.end());
+  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+  for (const double time_s : cuts) {
+    const std::size_t piece = pieceAt(path, time_s);
+    const double share = (time_s - path.time_s[piece]) / (path.time_s[piece + 1] - path.time_s[piece]);
+    const double after_s = rest.time_s.empty() ? 0 : rest.time_s.back() + NO_TIME_S;
+    rest.time_s.push_back(std::max(after_s, time_s - by_s));
+    if (time_s < until_s) rest.bend_m.push_back(path.bend_m[piece]);
+    for (std::size_t i = 0; i < path.bodies.size(); ++i) {
+      const std::vector<Eigen::Isometry3d>& pose = path.bodies[i].pose;
+      rest.bodies[i].pose.push_back(interpolate(pose[piece], pose[piece + 1], share));
+    }
   }
   return rest;
 }

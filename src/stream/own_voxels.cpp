@@ -188,6 +188,7 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
     }
     stated_[key] = voxel;
   }
+  seen_alone_ = std::move(look.seen_alone);
 }
 
 /// Which of what the map before left out is UNKNOWN: a body was within reach of it at that look, and already at the
@@ -277,7 +278,6 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   askUnseen(look, there, ways_there);
   for (const ReachedCube& cube : look.cubes) follow(cube, look);
   remembered_ = std::move(look.hidden);
-  seen_alone_ = std::move(look.seen_alone);
   stateWhatAppeared(look, bodies, ways);
   unseen_.keep();
   if (before_ && look.is_gap) gap_ = gapBefore(map);

@@ -1,6 +1,7 @@
 // Which voxels of a map a tracked body accounts for: the sensor that made the map saw the body there, not an obstacle.
 // The rule is the table of stream/voxel_states.h, voxel by voxel from one map to the next. Beside it:
-// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h); so is, in that map, what is
+// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h); so is, in that map,
+// what is
 //   own and touches such a voxel: it may hold more of the same.
 // - A voxel of a map that is trusted (octomap_file) is an obstacle.
 // - Where a body is gone, nothing is its own any more.
@@ -64,8 +65,8 @@ class OwnVoxelFinder {
     bool shown = true;  // the last map did
     bool grew = false;  // it came from outside of every reach: own voxels beside it may hold more of it
   };
-  /// What a map's maker saw, not often enough for an obstacle, with nobody within reach: packed, and whether in more than one
-  /// map. One is a sensor's noise where a body comes next; what was seen again is there, whoever comes.
+  /// What a map's maker saw, not often enough for an obstacle, with nobody within reach: packed, and whether in more
+  /// than one map. One is a sensor's noise where a body comes next; what was seen again is there, whoever comes.
   using SeenAlone = std::unordered_map<std::uint64_t, bool>;
   /// Of one map.
   struct Look;

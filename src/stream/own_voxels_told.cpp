@@ -71,9 +71,9 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   const bool some_grew = std::any_of(stated_.begin(), stated_.end(), isGrown);
   const auto isBesideGrown = [&](const VoxelKey& key) {
     return some_grew && anyAround(key, [&](std::uint64_t beside) {
-      const auto found = stated_.find(beside);
-      return found != stated_.end() && isGrown(*found);
-    });
+             const auto found = stated_.find(beside);
+             return found != stated_.end() && isGrown(*found);
+           });
   };
   std::vector<OwnVoxel> voxels;
   for (const auto& [key, voxel] : stated_) {

@@ -366,7 +366,8 @@ class Search {
   double off_path_s_ = MOST_PROMISED_S, itself_s_ = MOST_PROMISED_S, off_path_scale_ = 1;
 };
 
-/// A path that breaks a bound says that one of the two is wrong. Empty: it breaks none.
+/// A path that breaks a bound says that one of the two is wrong. Empty: it breaks none. What takes no longer than
+/// stamps tell apart has no pace: there nobody knows how far on the path the bodies are (restOf()).
 std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bounds, const IntendedPath& path) {
   for (const IntendedPath::Of& of : path.bodies) {
     const Body& body = outcome.step->bodies[of.body];
@@ -375,7 +376,10 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
     const Eigen::Isometry3d to_body = body.pose_t1.inverse();
     for (const Vec3& p : *body.t1) box.extend(to_body * p);
     for (std::size_t k = 0; k < path.bend_m.size(); ++k) {
-      const double most_m = bounds[of.body].max_m_s * (path.time_s[k + 1] - path.time_s[k]) * (1 + 1e-9) + 1e-12;
+      constexpr double NO_PACE_S = 2e-9;
+      const double lasts_s = path.time_s[k + 1] - path.time_s[k];
+      if (lasts_s < NO_PACE_S) continue;
+      const double most_m = bounds[of.body].max_m_s * lasts_s * (1 + 1e-9) + 1e-12;
       const auto isTooFar = [&](const Vec3& p) { return (of.pose[k + 1] * p - of.pose[k] * p).norm() > most_m; };
       bool may_be = false;
       for (int i = 0; i < 8; ++i)

@@ -101,7 +101,9 @@ TEST(TouchGeometry, PlacesAreThoseWithoutLanes) {
 }
 
 TEST(TouchGeometry, GeometryIsThatOfTheContact) {
-  const auto reference = [](PairKind kind, const TouchingShapes& one) { return contactGeometry(kind, one.pair, one.toc); };
+  const auto reference = [](PairKind kind, const TouchingShapes& one) {
+    return contactGeometry(kind, one.pair, one.toc);
+  };
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     compare(kind, true, simd::touchGeometry, reference);
   }

@@ -256,7 +256,7 @@ TEST(IntendedPath, OneThatCannotBeUsedChangesNothing) {
   EXPECT_EQ(unused([](Scene& s) { s.path.bodies.push_back(s.path.bodies[0]); }), "it moves 'tool' twice");
   EXPECT_EQ(unused([](Scene& s) { s.path.deviation_m = -1; }), "its tube is not 0 or more");
   EXPECT_EQ(unused([](Scene& s) { s.path.bodies.clear(); }), "it moves no body that is watched");
-  EXPECT_EQ(unused([](Scene& s) { s.path = restOf(s.path, 1); }), "it is over");
+  EXPECT_EQ(unused([](Scene& s) { s.path = restOf(s.path, 1, 1, NONE); }), "it is over");
   EXPECT_EQ(unused([](Scene& s) {
               Positions lost = *s.step.bodies[0].t1;
               lost[0].x() = std::nan("");
@@ -316,13 +316,55 @@ TEST(IntendedPath, WhereOnItBodiesAre) {
   EXPECT_NEAR(placeOnPath(scene.path, at(0.5, 0.02), 0, 1).off_m, 0.02, 3e-3);
   EXPECT_NEAR(placeOnPath(scene.path, at(0.5, 0), 0, 0.3).time_s, 0.3, 1e-9) << "it is not to be farther than that";
   EXPECT_GT(placeOnPath(scene.path, at(0.5, 0), 0, 0.3).off_m, 0.05);
-  const IntendedPath rest = restOf(scene.path, 0.26);
+  const IntendedPath rest = restOf(scene.path, 0.26, 0.26, NONE);
   EXPECT_NEAR(rest.endsAt(), 0.74, 1e-12);
   EXPECT_EQ(rest.time_s[0], 0);
   EXPECT_LE(placeOnPath(rest, at(0.26, 0), 0, 0).off_m, 1e-3);
   Step lost = at(0.5, 0);
   lost.bodies[0].t1 = share(Positions(lost.bodies[0].t1->size(), Vec3::Constant(std::nan(""))));
   EXPECT_EQ(placeOnPath(scene.path, lost, 0, 1).off_m, NONE);
+}
+
+/// The path of a body that goes along x, by places and times.
+IntendedPath alongX(const std::vector<std::pair<double, double>>& time_and_x) {
+  IntendedPath path;
+  path.bodies = {{0, {}}};
+  for (const auto& [time_s, x] : time_and_x) {
+    if (!path.time_s.empty()) path.bend_m.push_back(0);
+    path.time_s.push_back(time_s);
+    path.bodies[0].pose.push_back(Eigen::Isometry3d(Eigen::Translation3d(x, 0, 0)));
+  }
+  return path;
+}
+
+// Who may be further on the path than the nearest place, for all that its tube tells, is taken to be there already.
+TEST(IntendedPath, OfSeveralPlacesTheLastOneTellsTheTime) {
+  const Scene scene = Scene(0.2).goes({0.4, 0, 0}, 1);
+  const Step& rests = scene.step;  // at 0
+  const IntendedPath creeps = alongX({{0, -0.001}, {1, 0.001}, {2, 1}});
+  const PlaceOnPath on_creeping = placeOnPath(creeps, rests, 0, 0.9, 0.005);
+  EXPECT_NEAR(on_creeping.time_s, 0.5, 1e-9);
+  EXPECT_NEAR(on_creeping.last_s, 0.9, 1e-9) << "not beyond the time that is over";
+  EXPECT_NEAR(placeOnPath(creeps, rests, 0, 2, 0.0005).last_s, 0.75, 1e-6);
+  EXPECT_NEAR(placeOnPath(creeps, rests, 0, 2, 0.002).last_s, 1 + 0.001 / 0.999, 1e-6);
+  const IntendedPath rest = restOf(creeps, on_creeping.time_s, on_creeping.last_s, 0.5);
+  EXPECT_EQ(problemOf(rest, rests.bodies), "");
+  EXPECT_NEAR(rest.endsAt(), 0.5, 1e-12) << "by the clock";
+  EXPECT_NEAR(rest.bodies[0].pose.back().translation().x(), 0.001 + 0.4 * 0.999, 1e-9);
+  EXPECT_NEAR(rest.bodies[0].pose.front().translation().x(), 0, 1e-9);
+
+  // There and back: it is at the first of the two places, and may be at the second one.
+  const IntendedPath twice = alongX({{0, 0}, {0.5, 0.2}, {1, 0}, {1.5, 0.5}});
+  const PlaceOnPath on_twice = placeOnPath(twice, rests, 0, 1, 0.005);
+  EXPECT_NEAR(on_twice.time_s, 0, 1e-9);
+  EXPECT_NEAR(on_twice.last_s, 1, 1e-9);
+  const IntendedPath all = restOf(twice, on_twice.time_s, on_twice.last_s, NONE);
+  EXPECT_EQ(problemOf(all, rests.bodies), "");
+  EXPECT_NEAR(all.endsAt(), 0.5, 1e-6);
+  ASSERT_EQ(all.bodies[0].pose.size(), 4u);
+  EXPECT_LE(all.time_s[2], 1e-6) << "the way there and back takes no time";
+  EXPECT_NEAR(all.bodies[0].pose[1].translation().x(), 0.2, 1e-12);
+  EXPECT_NEAR(placeOnPath(twice, rests, 0.6, 1, 0.005).time_s, 1, 1e-9) << "once it has been away";
 }
 
 }  // namespace

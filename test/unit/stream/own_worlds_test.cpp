@@ -70,8 +70,8 @@ class OwnWorlds : public ::testing::Test {
     map_from_fixed_.setIdentity();
   }
 
-  /// What the sensor says: all that it does not show as occupied it shows as free, but for what it does not see. seen_seldom:
-  /// not often enough for an obstacle.
+  /// What the sensor says: all that it does not show as occupied it shows as free, but for what it does not see.
+  /// seen_seldom: not often enough for an obstacle.
   void map(const Cells& occupied, const std::function<bool(const Cell&)>& sees = nullptr, bool finds = true,
            const Cells& seen_seldom = {}) {
     ObstacleMap map;
@@ -286,8 +286,8 @@ TEST_F(OwnWorlds, AHandThatComesIsNeverTheirs) {
   }
 }
 
-// A hand comes from above onto a cloth that fills its own layer of voxels, and through it: no voxel in which the cloth is tells
-// of the hand. Once that is gone, the cloth's are its own again.
+// A hand comes from above onto a cloth that fills its own layer of voxels, and through it: no voxel in which the cloth
+// is tells of the hand. Once that is gone, the cloth's are its own again.
 TEST_F(OwnWorlds, AHandInTheClothsOwnLayerIsNotTheCloths) {
   for (const double thickness_m : {0.02, 0.04, 0.06}) {
     start();
@@ -308,8 +308,8 @@ TEST_F(OwnWorlds, AHandInTheClothsOwnLayerIsNotTheCloths) {
   }
 }
 
-// A cup is seen below a cloth that sinks, too seldom for an obstacle while the cloth is out of reach: once it may be a sensor's
-// noise, twice it is there. A doubt of the map's maker, so that only its own octree tells it.
+// A cup is seen below a cloth that sinks, too seldom for an obstacle while the cloth is out of reach: once it may be a
+// sensor's noise, twice it is there. A doubt of the map's maker, so that only its own octree tells it.
 TEST_F(OwnWorlds, WhatWasSeenTwiceWithNobodyNearIsNotTheCloths) {
   const Cells cup = cellsOf({0.121, 0.071, 0.041}, {0.179, 0.13, 0.059});
   for (const int looks : {1, 2, 3}) {

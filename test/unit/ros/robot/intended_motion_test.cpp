@@ -130,6 +130,24 @@ struct Lift {
   Driven driven;
 };
 
+// A robot that rests, or has fallen behind, goes by its motion until the next one begins, or its own was to end: by the
+// clock.
+TEST(IntendedMotion, TheOneBeforeCountsUntilTheNewestBegins) {
+  for (const double pace : {0.0, 0.5, 1.0}) {
+    Lift lift;
+    const auto at = [&](double stamp_s) { return 0.1 - 0.05 * pace * (stamp_s - 1.2); };
+    lift.step(1.1, 0.1);
+    ASSERT_EQ(lift.driven.pipeline.intend(lifts(1.2, {{0, 0.1}, {3, 0.1 - 0.15}})), "");
+    ASSERT_EQ(lift.driven.pipeline.intend(lifts(2.1, {{0, at(2.1)}, {0.3, 0.6}})), "");
+    for (const double stamp_s : {1.3, 1.5, 1.9, 2.05}) {
+      // Off its place on the path by what it is behind, which is within the tube as long as it is near.
+      const auto& intended = lift.step(stamp_s, at(stamp_s));
+      ASSERT_EQ(intended.along.unused, "") << pace << ' ' << stamp_s;
+      EXPECT_NEAR(intended.path.endsAt(), std::min(1.0, 2.1 - stamp_s), 1e-6) << pace << ' ' << stamp_s;
+    }
+  }
+}
+
 TEST(IntendedMotion, AwayFromTheClothTheTubeAloneLimits) {
   Lift lift;
   lift.step(1, 0.1);
