@@ -11,6 +11,7 @@ import sys
 import tempfile
 import unittest
 import warnings
+import xmlrpc.client
 
 import rosgraph
 import rospy
@@ -157,6 +158,10 @@ class LiveNodeTest(unittest.TestCase):
                 subscribers = self.listen_to(name)
         for subscriber in subscribers:
             self.addCleanup(subscriber.unregister)
+        # A listener is connected a moment before the node knows of it, and what is published in between is lost.
+        asked = xmlrpc.client.ServerProxy(rosgraph.Master('/live_node_test').lookupNode('/' + name))
+        topics = {subscriber.resolved_name for subscriber in subscribers}
+        wait_for(lambda: topics <= {row[4] for row in asked.getBusInfo('/live_node_test')[2] if row[2] == 'o'}, 20, 'the node to know of them')
         return node
 
     def listen_to(self, name):
