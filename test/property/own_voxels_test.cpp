@@ -300,10 +300,11 @@ class Model {
   void settle(const Cell& cell, std::set<State>& states, const std::map<Cell, std::set<State>>& now, const Look& look) {
     const auto said = look.said.find(cell);
     const Kind kind = said == look.said.end() ? Kind::OBSTACLE : said->second ? Kind::DOUBT : Kind::OWN;
-    bool perhaps_grew = false;
+    bool perhaps_grew = false, is_beside_doubt = false;
     for (int i = 0; i < 27; ++i) {
       const Cell beside{cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1};
       if (beside == cell || look.occupied.count(beside) == 0) continue;
+      is_beside_doubt = is_beside_doubt || (look.said.count(beside) > 0 && look.said.at(beside));
       const auto its = now.find(beside);
       if (its == now.end()) continue;
       const bool is_own = look.said.count(beside) > 0 && !look.said.at(beside);
@@ -322,6 +323,8 @@ class Model {
     for (State state : states) {
       const bool appeared = state.kind == Kind::OWN && state.since_ns == before_ns_;
       if ((state.kind == Kind::LEFT ? Kind::DOUBT : state.kind) == kind) left.insert(state);
+      // Own, and beside one that grew: in doubt in this map. That it must be then own_worlds_test holds.
+      if (state.kind == Kind::OWN && kind == Kind::DOUBT && is_beside_doubt) left.insert(state);
       if (!(appeared && perhaps_grew && kind == Kind::DOUBT)) continue;
       left.insert({Kind::DOUBT, 0, *before_ns_, *before_ns_});
       ++grew;
