@@ -33,12 +33,6 @@ Quad canonical(PairKind kind, Quad q) {
   return q;
 }
 
-std::string name(const Quad& q) {
-  std::string s;
-  for (Index v : q) s += std::to_string(v) + ' ';
-  return s;
-}
-
 /// Swept axis-aligned boxes of the two features, on the exact coordinates.
 bool boxesOverlap(PairKind kind, const VertexMotion* vertices, const Quad& q) {
   const int first = kind == PairKind::VERTEX_FACE ? 1 : 2;
@@ -86,7 +80,7 @@ class TruthWatch {
       const std::size_t k = static_cast<std::size_t>(kind);
       for (std::size_t i = 0; i < seen_[k].size(); ++i) {
         const Quad& q = contacts_[k][i];
-        EXPECT_EQ(seen_[k][i], 1) << after << ": " << toString(kind) << ' ' << name(q);
+        EXPECT_EQ(seen_[k][i], 1) << after << ": " << toString(kind) << ' ' << testing::PrintToString(q);
       }
     }
   }
@@ -141,7 +135,7 @@ TEST_P(SceneTruth, NoTrueContactIsCulled) {
           filterPairs(filter, kind, records, scene.vertices.data(), contacts.data(), contacts.size(), kept.data()));
       std::vector<Quad> lost;
       std::set_difference(contacts.begin(), contacts.end(), kept.begin(), kept.end(), std::back_inserter(lost));
-      EXPECT_EQ(lost.size(), 0u) << toString(filter) << ", first " << toString(kind) << ' ' << name(lost[0]);
+      EXPECT_EQ(lost.size(), 0u) << toString(filter) << ", first " << toString(kind) << ' ' << testing::PrintToString(lost[0]);
     }
   }
 }

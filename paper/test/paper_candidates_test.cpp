@@ -73,12 +73,6 @@ World mixedWorld(unsigned seed, bool switches = false) {
   return w;
 }
 
-std::string name(const Quad& q) {
-  std::string s;
-  for (Index v : q) s += std::to_string(v) + ' ';
-  return s;
-}
-
 /// Every pair of features that may be tested, by the definition: no shared vertex, switches, active vertices.
 Candidates allFeaturePairs(const World& w) {
   Candidates all;
@@ -131,13 +125,13 @@ void expectComplete(const World& w, const Candidates& found) {
     EXPECT_EQ(std::adjacent_find(got.begin(), got.end()), got.end()) << "a pair occurs twice";
     for (const Quad& q : got) {
       EXPECT_TRUE(std::binary_search(allowed.begin(), allowed.end(), q))
-          << toString(kind) << ' ' << name(q) << "is no pair";
+          << toString(kind) << ' ' << testing::PrintToString(q) << " is no pair";
     }
     std::size_t required = 0;
     for (const Quad& q : allowed) {
       if (primitiveBvSeparated(kind, records.data(), q)) continue;
       ++required;
-      EXPECT_TRUE(std::binary_search(got.begin(), got.end(), q)) << toString(kind) << ' ' << name(q) << "is missing";
+      EXPECT_TRUE(std::binary_search(got.begin(), got.end(), q)) << toString(kind) << ' ' << testing::PrintToString(q) << " is missing";
     }
     EXPECT_GT(required, 0u);
   };
