@@ -9,9 +9,9 @@
 namespace {
 
 /// Integers from bytes; the lower end of the range when there are none left, so that short inputs are simple steps.
-class Bytes {
+class NumbersOfBytes {
  public:
-  Bytes(const std::uint8_t* data, std::size_t size) : data_(data), end_(data + size) {}
+  NumbersOfBytes(const std::uint8_t* data, std::size_t size) : data_(data), end_(data + size) {}
   int operator()(int low, int high) {
     const std::uint32_t range = static_cast<std::uint32_t>(high - low);
     std::uint32_t value = 0;
@@ -25,7 +25,7 @@ class Bytes {
 
 void mesh_step(const std::uint8_t* data, std::size_t size) {
   using namespace dccd::test;
-  Bytes bytes(data, size);
+  NumbersOfBytes bytes(data, size);
   const Draw draw = [&bytes](int low, int high) { return bytes(low, high); };
   // Small integers and few bits: degenerate in every way, and quick for the oracle.
   const Coordinates coordinates = draw(0, 1) == 0 ? Coordinates::SMALL_INTEGERS : Coordinates::FEW_BITS;
