@@ -108,7 +108,7 @@ def measure(arguments, which, rate, distances, out):
 
 
 def at_rank(values, share):
-    return values[min(len(values) - 1, int(share * len(values)))] if values else float('nan')
+    return sorted(values)[min(len(values) - 1, int(share * len(values)))] if values else float('nan')
 
 
 def line_of(row, r):

@@ -89,13 +89,12 @@ class Witness {
     out["proved_share_of_time"] = proved_s_ / window_s;
     out["scale_above_0"] = moving_s_ / window_s;
     out["scale_said"] = scales_.size();
-    out["scale"] = sorted(scales_);
+    out["scale"] = scales_;
     out["maps"] = map_stamps_.size();
-    out["map_age_s"] = sorted(map_ages_);
-    out["latency_ms"] = sorted(latencies_ms_);
-    out["step_ms"] = sorted(steps_ms_);
-    for (const auto& [name, ms] : stages_ms_)
-      out["stages_ms"][name] = sorted(ms);  // own_voxels: the telling of a map, beside the steps
+    out["map_age_s"] = map_ages_;
+    out["latency_ms"] = latencies_ms_;
+    out["step_ms"] = steps_ms_;
+    out["stages_ms"] = stages_ms_;
     out["reasons"] = reasons_;
     out["scale_reasons"] = scale_reasons_;
     out["last"] = last_;
@@ -112,14 +111,10 @@ class Witness {
   ros::Time newest_;
   std::set<ros::Time> map_stamps_;
   std::vector<double> map_ages_, scales_, latencies_ms_, steps_ms_;
-  std::map<std::string, std::vector<double>> stages_ms_;  // of the steps in which they took time
+  std::map<std::string, std::vector<double>> stages_ms_;  // of each step; own_voxels: of a map, beside the steps
   std::map<std::string, std::size_t> reasons_, scale_reasons_;
   json last_;
 
-  static std::vector<double> sorted(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return values;
-  }
   std::map<std::string, double> seconds() const {
     std::map<std::string, double> all{{"machine", machineSeconds()}, {"publisher", processorSeconds("self")}};
     for (const std::string& one : settings_.processes) {
@@ -166,9 +161,7 @@ class Witness {
     if (!is_open_ || !m.answered) return;
     latencies_ms_.push_back(1e3 * m.latency);
     steps_ms_.push_back(m.total_ms);
-    for (const auto& stage : m.stages) {
-      if (stage.ms > 0) stages_ms_[stage.name].push_back(stage.ms);
-    }
+    for (const auto& stage : m.stages) stages_ms_[stage.name].push_back(stage.ms);
     last_ = {{"frames_received", m.frames_received}, {"frames_processed", m.frames_processed},
              {"frames_skipped", m.frames_skipped},   {"maps_received", m.maps_received},
              {"maps_refused", m.maps_refused},       {"map_leaves", m.map_leaves}};

@@ -307,14 +307,20 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
 
 bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
   Impl& m = *impl_;
-  if (m.pending.empty()) return false;
+  if (m.pending.empty()) {
+    m.tellBetweenSteps();
+    return false;
+  }
   Impl::Pending& step = m.pending.front();
   const bool timed_out = m.finishing || secondsBetween(step.since_ns, now_ns) >= m.options.sync_timeout_s;
   bool waits = false;
   for (std::size_t b = 0; b < m.bodies.size() && step.status == StepStatus::OK; ++b) {
     if (b != m.options.clock_body && m.waitsFor(b, step, timed_out)) waits = true;
   }
-  if (waits && step.status == StepStatus::OK) return false;
+  if (waits && step.status == StepStatus::OK) {
+    m.tellBetweenSteps();
+    return false;
+  }
   const auto without = [&](StepStatus status, const std::string& reason) {
     outcome = Outcome{};
     outcome.status = status;

@@ -138,9 +138,13 @@ struct Monitor::Impl {
   void awaitTelling() const {
     if (telling.valid()) telling.wait();
   }
+  bool tellsBeside() const {
+    return options.own_voxels_beside && std::any_of(bodies.begin(), bodies.end(), ownsVoxels);
+  }
   void tellBeside(std::size_t count, std::vector<TrackedBody> bodies_tracked);
   /// Outside of a step: what is own is followed, as far as the bodies' ways are known.
   void followOwnVoxels(StampNs stamp_ns);
+  void tellBetweenSteps();
   void limitMapsToCome();
   void forgetOwnVoxels(std::size_t body);
   /// Whether it can be used together with the one that is trusted; else there is none.

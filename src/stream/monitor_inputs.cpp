@@ -72,7 +72,11 @@ Step Monitor::Impl::place(const Pending& pending) {
   step.start_ns = pending.from->stamp_ns;
   step.stamp_ns = pending.to->stamp_ns;
   step.sequence = pending.sequence;
-  takeMaps(step.stamp_ns);
+  if (tellsBeside()) {
+    finishTelling();
+  } else {
+    takeMaps(step.stamp_ns);
+  }
   step.map = usableMap(step.stamp_ns);
   thinned_out.clear();
   Shown shown(bodies.size() + 1);

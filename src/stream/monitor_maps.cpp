@@ -185,6 +185,12 @@ void Monitor::Impl::followOwnVoxels(StampNs stamp_ns) try {
   // The maps wait for the next one.
 }
 
+/// When all that can be is answered: within a step, what tells what is own would take the processor from it.
+void Monitor::Impl::tellBetweenSteps() {
+  if (!tellsBeside() || maps_to_come.empty() || stores[options.clock_body].empty()) return;
+  followOwnVoxels(pending.empty() ? stores[options.clock_body].newest().stamp_ns : pending.front().to->stamp_ns);
+}
+
 bool Monitor::Impl::fitsTrusted(const ObstacleMap& next) {
   const VoxelSurface* sure = trusted.surface.get();
   // The one lattice of both is the live map's: a message has all digits of its resolution, a file's header six.

@@ -86,7 +86,10 @@ void OwnVoxelFinder::listChanges(Look& look) {
 
 void OwnVoxelFinder::seeAlone(const OccupiedLeaf& voxel, Look& look) {
   const std::uint64_t key = packed(voxel.min);
-  look.seen_alone[key] = seen_alone_.count(key) > 0;
+  const auto before = seen_alone_.find(key);
+  const bool was_seen = before != seen_alone_.end();
+  // What one look left behind stands in the next map, too, if nothing looks there.
+  look.seen_alone[key] = was_seen && (before->second || !look.tellsFound() || look.wasFound(voxel));
   seen_.push_back(voxel);
 }
 
