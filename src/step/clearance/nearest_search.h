@@ -293,22 +293,29 @@ class NearestSearch {
     pair.squared = std::max(pair.squared, squared);
     return prunes(squared);
   }
-  /// The same of two leaves or items in the direction from one to the other: what is hollow is nearly as near in many.
-  template <class A, class B>
-  bool prunesBetween(const A& a, const StepBox& box_a, const B& b, const StepBox& box_b, Pair& pair) {
-    if (!(enough_m_ > 0)) return false;
+  /// What two are apart at least in the direction from the one's box to the other's; negative: it is not told.
+  template <class ReachA, class ReachB>
+  double apartBetween(const StepBox& box_a, const ReachA& reach_a, const StepBox& box_b, const ReachB& reach_b) const {
     Turning from_a, from_b;
     for (int end = 0; end < 2; ++end) {
       const Vec3 between = box_a.middle(end) - box_b.middle(end);
       const double length = between.norm();
-      if (!(length > tolerance::CLEARANCE_DIRECTION_M)) return false;
+      if (!(length > tolerance::CLEARANCE_DIRECTION_M)) return -1;
       from_b[end] = between / length;
       from_a[end] = -from_b[end];
     }
-    const auto reachOf = [&](const auto& tree, std::uint32_t in, const Turning& along) {
-      return pair.items ? tree.itemReach(in, along) : tree.leafReach(in, along);
+    return apartBy(reach_a(from_a), reach_b(from_b), goal_.at_end);
+  }
+  /// The same of two leaves or items in that direction: what is hollow is nearly as near in many.
+  template <class A, class B>
+  bool prunesBetween(const A& a, const StepBox& box_a, const B& b, const StepBox& box_b, Pair& pair) {
+    if (!(enough_m_ > 0)) return false;
+    const auto reachOf = [&](const auto& tree, std::uint32_t in) {
+      return [&tree, in, items = pair.items](const Turning& along) {
+        return items ? tree.itemReach(in, along) : tree.leafReach(in, along);
+      };
     };
-    return prunesApart(apartBy(reachOf(a, pair.a, from_a), reachOf(b, pair.b, from_b), goal_.at_end), pair);
+    return prunesApart(apartBetween(box_a, reachOf(a, pair.a), box_b, reachOf(b, pair.b)), pair);
   }
 
   /// Whether a face's own plane shows that a leaf of the other tree needs no further look. Of things that face each
@@ -375,14 +382,22 @@ class NearestSearch {
   /// what was found, the nearest boxes first. Ends where nothing is nearer than at_least_m.
   template <class A, class B, class Meet>
   void compareAround(const A& a, const B& b, std::uint32_t item, bool second, double at_least_m, const Meet& meet) {
-    const auto look = [&](const auto& tree, const StepBox& box, const auto& compareWith) {
+    const auto look = [&](const auto& own, const auto& tree, const auto& compareWith) {
+      const StepBox box = own.itemBox(item);
       const auto gapTo = [&](const StepBox& other) { return squaredGap(box, other, goal_.at_end ? 1 : 0); };
       open_.assign(1, {0.0, tree.root()});
       while (!open_.empty() && at_least_m < enough_m_ && !isLate()) {
         const auto [squared, in] = open_.back();
         open_.pop_back();
         if (squared >= enough_squared_) continue;
+        if (has_direction_) {
+          const Reach its = reach(own, item, true, second ? 1 : 0), others = reach(tree, in, false, second ? 0 : 1);
+          if (apartBy(its, others, goal_.at_end) >= enough_m_) continue;
+        }
         if (tree.isLeaf(in)) {
+          const auto itsReach = [&](const Turning& along) { return own.itemReach(item, along); };
+          const auto leafReach = [&tree, in = in](const Turning& along) { return tree.leafReach(in, along); };
+          if (apartBetween(box, itsReach, tree.box(in), leafReach) >= enough_m_) continue;
           for (std::uint32_t other = tree.first(in); other < tree.first(in) + tree.count(in); ++other) {
             if (gapTo(tree.itemBox(other)) < enough_squared_) compareWith(other);
           }
@@ -396,9 +411,9 @@ class NearestSearch {
       }
     };
     if (second) {
-      look(a, b.itemBox(item), [&](std::uint32_t other) { compare(a, b, {0, 0, other, item, true}, meet); });
+      look(b, a, [&](std::uint32_t other) { compare(a, b, {0, 0, other, item, true}, meet); });
     } else {
-      look(b, a.itemBox(item), [&](std::uint32_t other) { compare(a, b, {0, 0, item, other, true}, meet); });
+      look(a, b, [&](std::uint32_t other) { compare(a, b, {0, 0, item, other, true}, meet); });
     }
   }
 
