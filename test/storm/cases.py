@@ -1,6 +1,7 @@
 """Worlds made by hand, each of one thing that a monitor may get wrong: what came shows a contact, or that nobody knows."""
 import collections
 import math
+import random
 
 from geometry_msgs.msg import TransformStamped
 from octomap_msgs.msg import Octomap
@@ -522,6 +523,44 @@ def a_transform_that_comes_again_elsewhere_before_the_answer(c):
     c.tf('finger', every(.02, 1.11, -.11), z=lambda t: .3)
     c.tf('finger', [.51], z=lambda t: -.3, delay=.03)
     c.finger('finger')
+
+
+# Nothing is wrong in these, and all is proved but the first frame, and a step before a second body's first.
+LOW = [(x / 2, y / 2, -.8) for x, y, _ in SHEET]
+
+
+def an_arm(c, times, turn):
+    c.tf('arm', times, angle=turn)
+    c.tf('finger', times, z=lambda t: -.5, parent='arm')
+    c.finger('finger')
+
+
+def all_proved_a_fast_robot_whose_joints_come_at_500_hz(c):
+    c.body('sheet', LOW, 3, every(1 / 30, 1.5))
+    an_arm(c, every(.002, 1.6, -.1), lambda t: t - .7)
+
+
+def all_proved_a_fast_arm_seen_at_30_hz_and_a_cloth_at_10(c):
+    c.body('sheet', LOW, 3, every(.1, 2))
+    an_arm(c, every(1 / 30, 2.1, -.1), lambda t: 1.5 * (t - 1))
+
+
+def all_proved_two_noisy_cloths_out_of_phase(c):
+    noise = random.Random(1)
+    for name, height, begin in (('sheet', 0, 0), ('other', .1, .015)):
+        c.params['bodies'][name] = {'topic': '/' + name, 'topology': {'rows': 3, 'cols': 3}}
+        for t in every(1 / 30, 1.5, begin):
+            points = [tuple(x + noise.gauss(0, .001) for x in (p[0], p[1], height)) for p in SHEET]
+            c.add('/' + name, worlds.World.cloud(points, 3, c.ns(t), 'world'), t)
+
+
+def all_proved_a_simulation_at_a_third_of_real_time(c):
+    del c.params['sync_timeout_s']
+    c.body('sheet', LOW, 3, every(1 / 30, 1.5))
+    c.body('other', [(x, y, z - .2) for x, y, z in LOW], 3, every(1 / 30, 1.5, .01))
+    an_arm(c, every(1 / 30, 1.6, -.1), lambda t: .5 * (t - .7))
+    for row in c.rows:
+        row[2] = c.begin + int((row[2] - c.begin) / .3)
 
 
 CASES = {name: make for name, make in list(globals().items()) if callable(make) and getattr(make, '__code__', None)
