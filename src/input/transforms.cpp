@@ -71,14 +71,15 @@ TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped&
   const Frame* frame = frameOf(unslashed(transform.child_frame_id));
   if (!frame || frame->sent.empty()) return Jump::NONE;
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
-  const auto newest = std::prev(frame->sent.end()), at_stamp = frame->sent.find(stamp_ns);
-  const bool is_far = stamp_ns < newest->first - JUMP_BACK_NS;
-  if (!is_far && (at_stamp == frame->sent.end() || at_stamp == newest)) return Jump::NONE;
-  if (is_far) {
+  const StampNs newest_ns = frame->sent.rbegin()->first;
+  if (stamp_ns >= newest_ns) return Jump::NONE;  // nearly always: it is not looked for among thousands
+  if (stamp_ns < newest_ns - JUMP_BACK_NS) {
     const auto its_newest = frame->newest.find(sender);
     const bool went_back = its_newest != frame->newest.end() && stamp_ns < its_newest->second - JUMP_BACK_NS;
     return went_back ? Jump::LOOP : Jump::TWO_SENDERS;
   }
+  const auto at_stamp = frame->sent.find(stamp_ns);
+  if (at_stamp == frame->sent.end()) return Jump::NONE;
   const Sent now{frameOf(unslashed(transform.header.frame_id)), poseOf(transform.transform)};
   if (isSame(at_stamp->second, now, tolerance::SAME_PLACE)) return Jump::NONE;
   return *at_stamp->second.sender == sender ? Jump::LOOP : Jump::TWO_SENDERS;
@@ -133,18 +134,16 @@ bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform,
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
   const auto newest = frame.newest.try_emplace(*sent.sender, stamp_ns).first;
   newest->second = std::max(newest->second, stamp_ns);
-  const auto [at, is_new] = frame.sent.emplace(stamp_ns, sent);
-  if (!is_new) return true;
+  const std::size_t before = frame.sent.size();
+  const auto at = frame.sent.emplace_hint(frame.sent.end(), stamp_ns, sent);
+  if (frame.sent.size() == before) return true;
   const auto next = std::next(at);
   const bool passed_over = next == frame.sent.end() ? std::exchange(frame.passed_over, false) : next->second.gap;
   const bool lost = std::exchange(frame.lost, lost_) != lost_;
   at->second.gap = passed_over || lost;
-  const auto old =
-      frame.sent.lower_bound(frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
-  const std::size_t before = frame.sent.size();
-  frame.is_cut = frame.is_cut || old != frame.sent.begin();
-  frame.sent.erase(frame.sent.begin(), old);
-  kept_count_ += 1 + frame.sent.size() - before;
+  const StampNs oldest_ns = frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec());
+  for (; frame.sent.begin()->first < oldest_ns; frame.is_cut = true) frame.sent.erase(frame.sent.begin());
+  kept_count_ += frame.sent.size() - before;
   return false;
 }
 
