@@ -105,8 +105,8 @@ def hard_page(result, folder):
         for row, name in zip(both, names):
             with open(os.path.join(folder, name), "w") as out:
                 out.write(picture(row))
-        lines.append("| ![%s](hard_cases/%s) ![](hard_cases/%s) | **%s** %s | %s | %s | %s | %s | %s | %s |" % (
-            family, *names, family, WHAT[family], *(of_both(both, lambda row, key=key: "%d" % row[key])
+        lines.append("| ![](hard_cases/%s) ![](hard_cases/%s) | **%s** %s | %s | %s | %s | %s | %s | %s |" % (
+            *names, family, WHAT[family], *(of_both(both, lambda row, key=key: "%d" % row[key])
                                                     for key in ("contacts", "fcl_wrong", "fast_wrong")),
             of_both(both, by_integers), *(of_both(both, lambda row, key=key: microseconds(row[key])) for key in ("exact_ns", "exact_worst_ns"))))
     return lines
