@@ -176,21 +176,24 @@ def label(axes, rows, line):
 
 
 def plot_recordings(axes, studies):
-    """What each rung takes on recordings as a user has them: a row a rung, a mark a recording, its time as a share of the reference's."""
-    rungs = list(dict.fromkeys(r["setting"] for study in studies.values() for r in study["rows"] if r["varied"] == "rung"))
+    """What each rung takes on recordings as a user has them, and below what else can be had coarser: a mark a recording."""
+    def shown(study):
+        return sorted((r for r in study["rows"] if r["varied"] in ("rung", "frames", "mesh", "map")), key=lambda r: r["varied"] != "rung")
+
+    settings = list(dict.fromkeys((r["varied"], r["setting"]) for study in studies.values() for r in shown(study)))
     for k, (name, study) in enumerate(studies.items()):
-        rows = [r for r in study["rows"] if r["varied"] == "rung"]
-        height = [rungs.index(r["setting"]) + 0.12 * (k - (len(studies) - 1) / 2) for r in rows]
-        axes.plot([100 * r["share_of_time"] for r in rows], height, color="C%d" % (k + 2), marker="o", linestyle="none", label=name)
-        for r, y in zip(rows, height):
+        for r in shown(study):
+            at = 100 * r["share_of_time"], settings.index((r["varied"], r["setting"])) + 0.3 * (k / max(1, len(studies) - 1) - 0.5)
+            axes.plot(*at, color="C%d" % (k + 2), marker="o", linestyle="none", label=None if r["varied"] != "rung" else name)
             if r["patches_missed"] or r["patches_invented"]:
-                axes.annotate("%d missed, %d invented" % (r["patches_missed"], r["patches_invented"]), (100 * r["share_of_time"], y),
-                              xytext=(6, -3), textcoords="offset points", fontsize=7)
-    axes.set_yticks(range(len(rungs)), rungs)
+                axes.annotate("%d missed, %d invented" % (r["patches_missed"], r["patches_invented"]), at, xytext=(6, -3), textcoords="offset points", fontsize=7)
+    axes.set_yticks(range(len(settings)))
+    axes.set_yticklabels(" ".join(s) for s in settings)
     axes.invert_yaxis()
     axes.axvline(100, color="black", linewidth=0.8)
-    axes.set(xlim=(0, None), xlabel="time on a recording [% of its most accurate setting's]", title="Rungs on recordings: patches missed or invented are named")
-    axes.legend(fontsize=8, loc="lower left")
+    axes.set(xscale="log", xlim=(None, 200 * max(r["share_of_time"] for study in studies.values() for r in shown(study))), xlabel="time on a recording [% of its most accurate setting's]", title="Rungs on recordings, and what else can be had coarser")
+    names = dict(zip(*reversed(axes.get_legend_handles_labels())))
+    axes.legend(names.values(), names.keys(), fontsize=8)
 
 
 def plot_errors(axes, scene, steps, colour):
@@ -259,24 +262,23 @@ def plot(found, folder):
     matplotlib.rcParams["svg.fonttype"] = "none"  # names as text, a tenth of the file
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure = plt.figure(figsize=(10, 11))
-    grid = figure.add_gridspec(3, 2)
+    figure = plt.figure(figsize=(9, 13))
+    grid = figure.add_gridspec(4, 2, height_ratios=(4, 4, 3, 3))
     plot_recordings(figure.add_subplot(grid[0, :]), found["studies"])
     upper = []
     for k, scene in enumerate(list(dict.fromkeys(r["scene"] for r in found["steps"]))[:2]):
         upper.append(figure.add_subplot(grid[1, k], sharey=upper[0] if upper else None))
         plot_errors(upper[k], scene, found["steps"], "C%d" % k)
     upper[0].set_ylabel("largest error of a time of contact [step]")
-    wrong, hard = (figure.add_subplot(grid[2, column]) for column in (0, 1))
+    wrong, hard = (figure.add_subplot(grid[row, :]) for row in (2, 3))
     plot_wrong(wrong, found["steps"], found["rivals"])
     plot_hard(hard, found["pairs"])
     wrong.set_title("Rivals, on the same steps")
     hard.set_title("Rivals, on hard pairs")
-    for axes in (*upper, wrong, hard):
-        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1,)))
+    for axes in figure.axes:
+        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1, 5) if axes is hard else (1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
-    for axes in figure.axes:
         axes.grid(True, linewidth=0.3)
         for name in axes.texts:  # readable on the front's line
             name.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5})

@@ -306,7 +306,7 @@ class MonitorPipeline {
   void followIntended(const Outcome& outcome);
   std::vector<CarriedBody> carriedBodies() const;
   void loadFiles();
-  /// Whether the map was occupied along a body when the two first met, of each once: a camera's may hold the body itself.
+  /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.
   void doubtMap(const Outcome& outcome);
   void keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new);
   void voidWhatWasSaid(const std::string& why);
