@@ -175,21 +175,38 @@ def label(axes, rows, line):
                       xytext=(10, -11 if goes_on else -3), textcoords="offset points", fontsize=7)
 
 
-def plot_errors(axes, scene, steps, others, colour):
-    """Time across, error up, of one scene. A mark a setting; crossed where answers are missing, ringed where some are false."""
+def plot_recordings(axes, studies):
+    """What each rung takes on recordings as a user has them, and below what else can be had coarser: a mark a recording."""
+    def shown(study):
+        return sorted((r for r in study["rows"] if r["varied"] in ("rung", "frames", "mesh", "map")), key=lambda r: r["varied"] != "rung")
+
+    settings = list(dict.fromkeys((r["varied"], r["setting"]) for study in studies.values() for r in shown(study)))
+    for k, (name, study) in enumerate(studies.items()):
+        for r in shown(study):
+            at = 100 * r["share_of_time"], settings.index((r["varied"], r["setting"])) + 0.3 * (k / max(1, len(studies) - 1) - 0.5)
+            axes.plot(*at, color="C%d" % (k + 2), marker="o", linestyle="none", label=None if r["varied"] != "rung" else name)
+            if r["patches_missed"] or r["patches_invented"]:
+                axes.annotate("%d missed, %d invented" % (r["patches_missed"], r["patches_invented"]), at, xytext=(6, -3), textcoords="offset points", fontsize=7)
+    axes.set_yticks(range(len(settings)))
+    axes.set_yticklabels(" ".join(s) for s in settings)
+    axes.invert_yaxis()
+    axes.axvline(100, color="black", linewidth=0.8)
+    axes.set(xscale="log", xlim=(None, 200 * max(r["share_of_time"] for study in studies.values() for r in shown(study))), xlabel="time on a recording [% of its most accurate setting's]", title="Rungs on recordings, and what else can be had coarser")
+    names = dict(zip(*reversed(axes.get_legend_handles_labels())))
+    axes.legend(names.values(), names.keys(), fontsize=8)
+
+
+def plot_errors(axes, scene, steps, colour):
+    """Time across, error up, of one real step. A mark a setting."""
     mine = [r for r in steps if r["scene"] == scene]
-    line, rivals = front(mine), [r for r in others if r["scene"] == scene]
+    line = front(mine)
     axes.plot([r["median_ms"] for r in line], [r["toc_error"] for r in line], color=colour, linewidth=0.8, drawstyle="steps-post")
-    for r in mine + rivals:
-        marker = {"exact": "o", "conservative": "s", "fast's": "D"}.get(r["setting"].split()[0], "^")
-        axes.plot(r["median_ms"], r["toc_error"], color=colour, linestyle="none", markersize=6, marker=marker)
-        if r["missed"]:
-            axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="x", markersize=13, markeredgewidth=1.5)
-        if r["false"]:
-            axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="o", markersize=15, fillstyle="none")
-    label(axes, mine + rivals, line)
-    times = [r["median_ms"] for r in mine + rivals]
-    axes.set(yscale="log", xscale="log", xlim=(0.85 * min(times), 2.2 * max(times)), title=scene, xlabel="whole step, one thread, median [ms]")
+    for r in mine:
+        axes.plot(r["median_ms"], r["toc_error"], color=colour, linestyle="none", markersize=6, marker="o" if r["setting"].startswith("exact") else "s")
+    label(axes, mine, line)
+    times = [r["median_ms"] for r in mine]
+    axes.set(yscale="log", xscale="log", xlim=(0.85 * min(times), 2.2 * max(times)), title="Rungs on one step of " + scene,
+             xlabel="whole step, one thread, median [ms]")
 
 
 def plot_wrong(axes, steps, rivals):
@@ -239,25 +256,26 @@ def plot_hard(axes, pairs):
     axes.set(xscale="log", xlabel="one pair of the hard queries [us]", ylabel="share of wrong answers")
 
 
-def plot(steps, rivals, pairs, folder):
+def plot(found, folder):
     import matplotlib
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.fonttype"] = "none"  # names as text, a tenth of the file
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure = plt.figure(figsize=(9, 11))
-    grid = figure.add_gridspec(3, 2, height_ratios=(2, 1, 1))
-    scenes = list(dict.fromkeys(r["scene"] for r in steps))
+    figure = plt.figure(figsize=(9, 13))
+    grid = figure.add_gridspec(4, 2, height_ratios=(4, 4, 3, 3))
+    plot_recordings(figure.add_subplot(grid[0, :]), found["studies"])
     upper = []
-    for k, scene in enumerate(scenes[:2]):
-        upper.append(figure.add_subplot(grid[0, k], sharey=upper[0] if upper else None))
-        plot_errors(upper[k], scene, steps, rivals, "C%d" % k)
+    for k, scene in enumerate(list(dict.fromkeys(r["scene"] for r in found["steps"]))[:2]):
+        upper.append(figure.add_subplot(grid[1, k], sharey=upper[0] if upper else None))
+        plot_errors(upper[k], scene, found["steps"], "C%d" % k)
     upper[0].set_ylabel("largest error of a time of contact [step]")
-    figure.suptitle("What accuracy costs: cross = contacts missed, ring = contacts invented, line = the front", fontsize=11)
-    lower, hard = (figure.add_subplot(grid[row, :]) for row in (1, 2))
-    plot_wrong(lower, steps, rivals)
-    plot_hard(hard, pairs)
-    for axes in (*upper, lower, hard):
+    wrong, hard = (figure.add_subplot(grid[row, :]) for row in (2, 3))
+    plot_wrong(wrong, found["steps"], found["rivals"])
+    plot_hard(hard, found["pairs"])
+    wrong.set_title("Rivals, on the same steps")
+    hard.set_title("Rivals, on hard pairs")
+    for axes in figure.axes:
         axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1, 5) if axes is hard else (1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
@@ -266,7 +284,7 @@ def plot(steps, rivals, pairs, folder):
             name.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5})
     figure.tight_layout()
     for ending in ("svg", "png"):
-        figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=130)
+        figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=110)
 
 
 def markdown(rows, rivals, pairs):
@@ -325,7 +343,7 @@ def main():
     write_csv(os.path.join(a.out, "accuracy_pairs.csv"), found["pairs"])
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
         f.write(markdown(found["steps"], found["rivals"], found["pairs"]) + study_tables(found["studies"]))
-    plot(found["steps"], found["rivals"], found["pairs"], a.out)
+    plot(found, a.out)
     print("results: " + a.out)
 
 

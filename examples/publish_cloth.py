@@ -4,6 +4,7 @@ off, every ten seconds. Publishes sensor_msgs/PointCloud2 on /tracker/cloth, row
 """
 import math
 import struct
+import sys
 import time
 
 import rospy
@@ -23,6 +24,8 @@ def point(row, col, t):
     return math.copysign(abs(s) - hangs, s), y * math.cos(fold), TOP_M - 0.003 + up - hangs + y * math.sin(fold)
 
 
+if len(rospy.myargv()) > 1:
+    sys.exit(__doc__ + 'It takes no arguments but those of ROS.')
 rospy.init_node('publish_cloth')
 # RViz warns until tf knows its fixed frame.
 box = TransformStamped(child_frame_id='box')

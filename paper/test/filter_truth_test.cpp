@@ -135,7 +135,8 @@ TEST_P(SceneTruth, NoTrueContactIsCulled) {
           filterPairs(filter, kind, records, scene.vertices.data(), contacts.data(), contacts.size(), kept.data()));
       std::vector<Quad> lost;
       std::set_difference(contacts.begin(), contacts.end(), kept.begin(), kept.end(), std::back_inserter(lost));
-      EXPECT_EQ(lost.size(), 0u) << toString(filter) << ", first " << toString(kind) << ' ' << testing::PrintToString(lost[0]);
+      EXPECT_EQ(lost.size(), 0u) << toString(filter) << ", first " << toString(kind) << ' '
+                                 << testing::PrintToString(lost[0]);
     }
   }
 }

@@ -131,7 +131,8 @@ void expectComplete(const World& w, const Candidates& found) {
     for (const Quad& q : allowed) {
       if (primitiveBvSeparated(kind, records.data(), q)) continue;
       ++required;
-      EXPECT_TRUE(std::binary_search(got.begin(), got.end(), q)) << toString(kind) << ' ' << testing::PrintToString(q) << " is missing";
+      EXPECT_TRUE(std::binary_search(got.begin(), got.end(), q))
+          << toString(kind) << ' ' << testing::PrintToString(q) << " is missing";
     }
     EXPECT_GT(required, 0u);
   };

@@ -303,7 +303,11 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
     // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as
     // long.
-    if (!known_.topology) refuseMessage("the message has no triangles and no topology is known yet");
+    if (!known_.topology) {
+      refuseMessage(
+          "the message has no triangles and no topology is known yet; publish them once, or set topology/rows and "
+          "topology/cols for a grid, or topology/source to polyline or file");
+    }
     if (known_.topology->vertexCount() != count) {
       throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) +
                                                     " vertices without triangles, but the last topology has " +

@@ -211,7 +211,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   effects_.learn(outcome);
   frame_answered_ = frame_answered_ || outcome.answered;
   answerForCell(outcome.arrival_ns, now_ns, outcome);
-  doubtFirstMap(outcome);
+  doubtMap(outcome);
   if (outcome.answered) outcome.claim.answer(Question::NEWEST_FRAME, "");  // from now on Liveness watches
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
@@ -381,12 +381,11 @@ SpeedScale MonitorPipeline::speedScale(const Outcome& outcome) const {
   return dccd::speedScale(outcome, speedBounds(), *config_.speed_law);
 }
 
-void MonitorPipeline::doubtFirstMap(const Outcome& outcome) {
+void MonitorPipeline::doubtMap(const Outcome& outcome) {
   if (!outcome.answered || !outcome.obstacle || !outcome.start_state_complete) return;
   for (std::size_t b = 0; b < map_doubts_.size(); ++b) {
     const Body& body = outcome.step->bodies[b];
     if (map_doubts_[b] || !meetsMap(body)) continue;
-    std::string& doubt = map_doubts_[b].emplace();
     // Own voxels are looked for already, or cannot be; a file's are nobody's.
     if (ownsVoxels(body) || config_.takesMapFileAlone() || config_.unknown_space == UnknownSpace::OCCUPIED) continue;
     std::set<Index> occupied;
@@ -397,13 +396,17 @@ void MonitorPipeline::doubtFirstMap(const Outcome& outcome) {
       if (isMet(one.body, one.expected)) occupied.insert(one.vertex[0]);
     }
     // Noise has half of the vertices beside the voxels that hold them; their edges and faces meet those.
+    bool came_there = false;
     for (const Contact& one : outcome.contacts) {
-      if (!one.initial || !isMet(one.body, one.expected)) continue;
-      forContactVertices(one, [&](std::uint16_t, Index v) { occupied.insert(v); });
+      if (!isMet(one.body, one.expected)) continue;
+      came_there = true;
+      if (one.initial) forContactVertices(one, [&](std::uint16_t, Index v) { occupied.insert(v); });
     }
-    if (occupied.empty() || 2 * occupied.size() < body.topology->vertexCount()) continue;
-    doubt = "the map was occupied where '" + body.name + "' was: does it hold '" + body.name +
-            "' itself? Then set own_voxels_m: auto";
+    if (occupied.empty() && !came_there) continue;  // a later map may hold it
+    const bool holds = 2 * occupied.size() >= body.topology->vertexCount();
+    map_doubts_[b] = holds ? "the map was occupied where '" + body.name + "' was: does it hold '" + body.name +
+                                 "' itself? Then set own_voxels_m: auto"
+                           : "";
   }
 }
 

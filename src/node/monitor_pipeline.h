@@ -257,7 +257,7 @@ class MonitorPipeline {
   std::shared_ptr<const std::vector<OwnVoxel>> counted_voxels_;  // of a map: robots_voxels_ are the robot's
   std::size_t robots_voxels_ = 0;
   std::vector<std::string> problems_, hints_, file_hints_, doubts_;
-  std::vector<std::optional<std::string>> map_doubts_;  // of the first step with a map; empty: there is none
+  std::vector<std::optional<std::string>> map_doubts_;  // of the first step that met the map; empty: there is none
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   struct UnplacedMap {
@@ -306,8 +306,8 @@ class MonitorPipeline {
   void followIntended(const Outcome& outcome);
   std::vector<CarriedBody> carriedBodies() const;
   void loadFiles();
-  /// Whether the first map was occupied along a body, of each once: a camera's map may hold the body itself.
-  void doubtFirstMap(const Outcome& outcome);
+  /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.
+  void doubtMap(const Outcome& outcome);
   void keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new);
   void voidWhatWasSaid(const std::string& why);
   void setRigid(std::size_t body, const MeshResource& mesh);

@@ -95,7 +95,8 @@ std::string firstLost(const Step& step) {
     const std::vector<bool> masked = maskedOf(body);
     for (const Index v : body.topology->usedVertices()) {
       if (masked[v] || ((*body.t0)[v].allFinite() && (*body.t1)[v].allFinite())) continue;
-      return " (the first is " + std::to_string(v) + " of '" + body.name + "')";
+      return " (the first is " + std::to_string(v) + " of '" + body.name +
+             (body.rigid ? "', whose place is not known)" : "')");
     }
   }
   return "";

@@ -83,7 +83,14 @@ void addSentence(std::string& text, const std::string& sentence) {
 }  // namespace
 
 void Monitor::Impl::sayUnknown(const std::string& name, const std::string& why, Step& step) {
-  addSentence(step.off_path, "where " + name + " was is not known for all of this step (" + why + ")");
+  const std::string where = "where " + name + " was", known = " is not known for all of this step (" + why + ")";
+  const std::size_t same = step.off_path.find(known);
+  // Of a robot without tf the reason once, with the names of all links.
+  if (same == std::string::npos) {
+    addSentence(step.off_path, where + known);
+  } else if (step.off_path.find(where) == std::string::npos) {
+    step.off_path.insert(same + known.size(), ", nor " + where);
+  }
 }
 
 /// What was seen of the body between the step's ends must not be contradicted in silence: how uncertain it was, and

@@ -164,6 +164,11 @@ class CommandsTest(unittest.TestCase):
         self.assertNotEqual(self.source, 'false', 'no line "source build/…" in a code block of README.md')
         self.assertIn('deformable_ccd', self.runs('rospack find deformable_ccd'))
 
+    def test_the_tracker_says_that_it_takes_no_arguments(self):
+        ran = self.shell('timeout 30 rosrun deformable_ccd publish_cloth.py --help', 60)
+        self.assertEqual(ran.returncode, 1, 'it published until it was stopped')
+        self.assertIn('It takes no arguments', ran.stderr)
+
     # One method for each kind of command.
     def tracker_of(self, command):
         """The emulated publisher that a launched monitor is meant for."""

@@ -1,9 +1,8 @@
 """Each margin of tolerances.h at a tenth of its size, one at a time: a test must fail then (`--long`).
 
-The core is built once, with margins that are variables, in a folder of its own; test/margins/cut_margins.cpp cuts them. Its table is in
-doc/hard_cases.md:
+The core is built once, with margins that are variables, in a folder of its own; test/margins/cut_margins.cpp cuts them; its table:
 
-    scripts/benchmark hard_cases
+    build/margins/cut_margins
 """
 import os
 import re

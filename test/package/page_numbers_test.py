@@ -54,7 +54,8 @@ NUMBERS = {
 
 def calls():
     """Of every call of scripts/test on a page that names what is to be run: that, and its filter or nothing."""
-    pattern = re.compile(r"scripts/test(?: --[a-z]\w*)* --only ([^\s`]+)(?: --filter '([^']+)')?")
+    # The table of what was tried has it without the command, in a column of its own.
+    pattern = re.compile(r"(?:scripts/test(?: --[a-z]\w*)* |\| `)--only ([^\s`]+)(?: --filter '([^']+)')?")
     return [call for page in PAGES for call in pattern.findall(text(page))]
 
 

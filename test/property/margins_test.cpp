@@ -1,6 +1,6 @@
 // Inputs that lie at the bounds of the margins of tolerances.h: contacts that a smaller margin loses, and pairs apart
 // that it invents. `scripts/test --long` cuts one margin after the other to a tenth and shows that inputs of these
-// tests go wrong then (test/package/margins_test.py); the table is in doc/hard_cases.md.
+// tests go wrong then (test/package/margins_test.py); doc/hard_cases.md has what comes of it.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -55,6 +55,22 @@ TEST(Map, OneThatIsOccupiedAlongABodyFromTheFirstStepOnIsDoubted) {
   }
 }
 
+// The camera first looked before the cloth came.
+TEST(Map, OneThatComesToHoldABodyIsDoubtedToo) {
+  for (const bool comes_by_map : {true, false}) {
+    Driven driven(scene());
+    octomap::OcTree empty(0.1);
+    empty.updateNode(0.05, 0.05, 0.05, false);
+    driven.giveMap(empty, 1);
+    driven.feed(1, -0.05f);
+    EXPECT_TRUE(assuranceOf(driven.feed(1.1, -0.05f)).clear());
+    EXPECT_TRUE(driven.pipeline.doubts().empty());
+    if (comes_by_map) driven.giveMap(1.15);
+    driven.feed(1.2, -0.05f);
+    EXPECT_EQ(driven.pipeline.doubts().size(), comes_by_map ? 1u : 0u);
+  }
+}
+
 // Which of the two shows how things are now?
 TEST(Map, OneThatComesAfterALaterOneIsInDoubt) {
   Driven driven(scene("octomap_topic: /table"));

@@ -93,6 +93,19 @@ TEST_F(RobotPipeline, WhatTheHandHoldsIsExpectedUntilItOpens) {
   EXPECT_NE(pipeline.phaseInWords().find("mesh with palm"), std::string::npos);
 }
 
+// As before joint states come: the reason once, and the name of each link.
+TEST_F(RobotPipeline, LinksWithoutTransformsShareOneReason) {
+  start(robotScene());
+  for (const double at : {1.0, 1.1, 1.2}) feed(at, 0.3f);
+  const std::string said = joinedText(driven_->outcome.missing()), known = " is not known for all of this step (";
+  EXPECT_NE(said.find("(the first is 0 of 'palm', whose place is not known)"), std::string::npos) << said;
+  EXPECT_NE(said.find("where body 'palm' was" + known + "no transform of its frame at "), std::string::npos) << said;
+  EXPECT_EQ(said.find(known), said.rfind(known)) << said;
+  const std::string nor = "), nor where body 'thumb' was";
+  EXPECT_NE(said.find(nor), std::string::npos) << said;
+  EXPECT_EQ(said.find(nor), said.rfind(nor)) << said;
+}
+
 // The state is unproved and names it; the other link's contacts are found all the same.
 TEST_F(RobotPipeline, ALinkWithoutTransformIsNamedAndTheRestGoesOn) {
   start(robotScene());
