@@ -120,10 +120,8 @@ std::string IntendedMotion::segmentsOf(const trajectory_msgs::JointTrajectory& m
 std::string IntendedMotion::take(const trajectory_msgs::JointTrajectory& message, StampNs newest_ns) {
   Motion motion;
   motion.begin_ns = static_cast<StampNs>(message.header.stamp.toNSec());
-  const std::string problem = segmentsOf(message, motion);
-  if (problem.empty()) return add(std::move(motion), newest_ns);
-  forget();
-  return problem;
+  std::string problem = segmentsOf(message, motion);
+  return add(std::move(motion), std::move(problem), newest_ns);
 }
 
 std::string IntendedMotion::take(const geometry_msgs::TwistStamped& message, StampNs newest_ns) {
@@ -138,14 +136,12 @@ std::string IntendedMotion::take(const geometry_msgs::TwistStamped& message, Sta
   if (motion.frame.empty()) problem = "header/frame_id is empty";
   if (!allFinite(v)) problem = clause("twist/linear is (", v.x, ", ", v.y, ", ", v.z, ")");
   if (!allFinite(w)) problem = clause("twist/angular is (", w.x, ", ", w.y, ", ", w.z, ")");
-  if (problem.empty()) return add(std::move(motion), newest_ns);
-  forget();
-  return problem;
+  return add(std::move(motion), std::move(problem), newest_ns);
 }
 
-std::string IntendedMotion::add(Motion motion, StampNs newest_ns) {
-  std::string problem;
-  if (motion.begin_ns == 0) {
+std::string IntendedMotion::add(Motion motion, std::string problem, StampNs newest_ns) {
+  if (!problem.empty()) {
+  } else if (motion.begin_ns == 0) {
     problem = "header/stamp is 0: it says when the motion begins";
   } else if (motion.endNs() <= newest_ns) {
     problem = clause("header/stamp is late: the motion ended ", secondsBetween(motion.endNs(), newest_ns),
@@ -206,7 +202,8 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
                        : "has no place: nobody knows where '" + tree_->root() + "' is");
     return std::nullopt;
   }
-  const double now_s = secondsBetween(motion.begin_ns, step.stamp_ns), from_s = motion.passed_s;
+  if (motion.last.stamp_ns < step.stamp_ns) motion.before = motion.last;
+  const double now_s = secondsBetween(motion.begin_ns, step.stamp_ns), from_s = motion.before.at_s;
   double until_s = std::min(motion.duration_s, now_s + limits_.horizon_s);
   if (motions_.size() > 1) until_s = std::min(until_s, secondsBetween(motion.begin_ns, motions_[1].begin_ns));
   IntendedPath path = emptyPath(on_it);
@@ -236,18 +233,40 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
     addPieces(poses, end_s - from_s, acceleration, reach_m, bend_m_, MOST_PIECES, path);
   }
   if (!problemOf(path, step.bodies).empty()) return std::nullopt;
-  const double allowed_m = path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.passed_ns), step.stamp_ns));
+  const double allowed_m = path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.before.stamp_ns), step.stamp_ns));
   const PlaceOnPath place = placeOnPath(path, step, 0, now_s - from_s, allowed_m);
   if (!(place.off_m <= allowed_m)) {
     drop(clause("does not hold: the robot is ", place.off_m, " m off it, and ", allowed_m,
                 " m are allowed (intent/deviation_m)"));
     return std::nullopt;
   }
-  motion.passed_s = from_s + place.time_s;
-  motion.passed_ns = step.stamp_ns;
+  motion.last = {from_s + place.time_s, step.stamp_ns};
   // A robot that has fallen behind goes on by its motion only until the next one begins, or this one was to end.
   const StampNs end_ns = motions_.size() > 1 ? std::min(motion.endNs(), motions_[1].begin_ns) : motion.endNs();
   return restOf(path, place.time_s, place.last_s, std::min(limits_.horizon_s, secondsBetween(step.stamp_ns, end_ns)));
+}
+
+IntendedPath IntendedMotion::asked(trajectory_msgs::JointTrajectory message, const Step& step,
+                                   const std::vector<CarriedBody>& carried, const Lookup& lookup,
+                                   std::string& problem) const {
+  IntendedMotion alone(*this);
+  alone.forget();
+  alone.limits_.horizon_s = MOST_PROMISED_S;
+  message.header.stamp.fromNSec(static_cast<std::uint64_t>(step.stamp_ns));
+  problem = alone.take(message, step.stamp_ns);
+  if (!problem.empty()) return {};
+  const std::set<std::string> named(message.joint_names.begin(), message.joint_names.end());
+  for (const CarriedBody& one : carried) {
+    std::size_t others = 0;
+    const std::set<std::string> joints = tree_->hasLink(one.frame) ? tree_->jointsTo(one.frame) : named;
+    for (const std::string& joint : joints) others += named.count(joint) == 0;
+    if (others > 0 && others < joints.size()) problem = "joint_names: they move '" + one.frame + "', but not alone";
+  }
+  if (alone.motions_[0].duration_s > MOST_PROMISED_S) problem = clause("it lasts longer than ", MOST_PROMISED_S, " s");
+  if (!problem.empty()) return {};
+  const std::optional<IntendedPath> path = alone.from(step, carried, lookup);
+  problem = alone.takeProblem();
+  return path.value_or(IntendedPath());
 }
 
 /// Each until the next one begins. A constant twist turns about one axis of space and slides along it.

@@ -117,6 +117,22 @@ void StateReporter::tell(const Outcome& outcome, const Statement& statement, con
   say(true);
 }
 
+void StateReporter::tellSpeed(const Outcome& outcome, const SpeedScale& speed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!law_) return;
+  speed_told_ = toSpeedScale(outcome, speed, told_.header.frame_id);
+  say(true);
+}
+
+std::string StateReporter::whyNotProved() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Assurance assurance = answer_.assurance;
+  std::vector<std::string> sentences;
+  for (Fault& fault : liveness_.faults(clock_.now())) sentences.push_back(std::move(fault.sentence));
+  assurance.hinder(sentences);
+  return assurance.proved ? "" : assurance.missing.front();
+}
+
 void StateReporter::asked(const std::string& what) {
   const std::lock_guard<std::mutex> lock(mutex_);
   liveness_.ask(what);

@@ -61,6 +61,10 @@ class StateReporter {
   void staticInUse(const std::string& body, std::uint64_t number);
   /// A step's answer, or why there is none, and what it allows.
   void tell(const Outcome& outcome, const Statement& statement, const std::string& frame, const SpeedScale& speed);
+  /// Of the step that was told last: what it allows now.
+  void tellSpeed(const Outcome& outcome, const SpeedScale& speed);
+  /// Why nothing is proved now; empty: what was told last is.
+  std::string whyNotProved();
   /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
   void setHint(const std::string& hint);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.

@@ -195,6 +195,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
 
 double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {
   const bool with_map = way.still == OBSTACLE_BODY;
+  found_ = {};
   if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;
   const FeatureTree& tree = shapes_[way.mover].moving;
   const bool known = with_map ? outcome_->obstacle != nullptr : !shapes_[way.still].still.empty();
@@ -205,10 +206,20 @@ double PathDistances::over(const Way& way, const Stretch& stretch, double enough
   const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_, nullptr};
   const auto never = [](std::uint32_t, std::uint32_t) { return true; };  // is asked of what is at the end alone
   const NearestSearch::AllPairs all;
-  const FoundDistance found = with_map ? search_.run(tree, map_, all, goal, {}, never)
-                                       : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
-  const double rest_m = found.lower_m - taken_m - (ABOVE - 1) * found.lower_m;
+  found_ = with_map ? search_.run(tree, map_, all, goal, {}, never)
+                    : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
+  const double rest_m = found_.lower_m - taken_m - (ABOVE - 1) * found_.lower_m;
   return rest_m > 0 ? rest_m : 0;
+}
+
+Vec3 PathDistances::nearest(const Way& way, double time_s) {
+  over(way, {time_s, time_s}, LARGEST_M, 1e-6);
+  if (!std::isfinite(found_.upper_m)) return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Vec3 between = (found_.point[0] + found_.point[1]) / 2;
+  if (way.still == OBSTACLE_BODY) return outcome_->step->map.map_from_fixed.inverse() * between;
+  const std::vector<Eigen::Isometry3d>* const pose = shapes_[way.still].pose;
+  const std::size_t piece = pieceAt(time_s);
+  return pose ? interpolate((*pose)[piece], (*pose)[piece + 1], shareAt(piece, time_s)) * between : between;
 }
 
 }  // namespace dccd

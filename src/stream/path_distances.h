@@ -42,6 +42,8 @@ class DCCD_HIDDEN PathDistances {
   /// leave the straight ways through it [m]. Within the tolerance, but for these, of what is true where that is below
   /// enough_m. 0: nobody knows.
   double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m);
+  /// Where the two are nearest at a time, between them, in the fixed frame; NaN: nobody knows.
+  Vec3 nearest(const Way& way, double time_s);
   /// How far any vertex of the mover comes from where it is when the stretch begins, at most [m].
   double goneBy(const Way& way, const Stretch& stretch) const;
   /// What over() takes off for turns within the pieces of the stretch [m].
@@ -82,6 +84,7 @@ class DCCD_HIDDEN PathDistances {
   std::vector<Shape> shapes_;
   MapBoxes map_;
   NearestSearch search_;
+  FoundDistance found_;  // by the last question
   std::size_t questions_ = 0;
 };
 

@@ -72,6 +72,22 @@ class Search {
     if (law_) findScale(result);
     result.searches = distances_.questions();
   }
+  FirstTouch firstTouch() {
+    FirstTouch first;
+    first.free_s = farthest(Goal::UNTIL, path_.endsAt());
+    if (!failing_) return first;
+    const PathPair& pair = pairs_[*failing_];
+    first.body = pair.body;
+    first.point = distances_.nearest(pair.way, first.free_s);
+    if (pair.start_m == 0 && !pair.touches) {
+      first.unknown = "nobody knows how far they are apart";
+    } else if (!std::isfinite(pair.untilNeeds(1))) {
+      first.unknown = "nobody says how fast one of them is";
+    } else if (pair.is_cut) {
+      first.unknown = "there was no time to look further";
+    }
+    return first;
+  }
 
  private:
   using Stretch = PathDistances::Stretch;
@@ -99,6 +115,7 @@ class Search {
         return;
       }
       pair.separation_m = separationOf(outcome_, row);
+      pair.touches = row.at_end.status == ClearanceStatus::TOUCHING;
       pair.start_m = distance_m;
       pair.most_m = std::max(distance_m, row.at_end.upper_m);
       pair.deviation_m = static_cast<double>(pair.on_path) * path_.deviation_m;
@@ -223,6 +240,7 @@ class Search {
         ends.push_back(distances_.cutOf({known_s, end_s}));
         continue;
       }
+      pair.is_cut = !mayGoOn(pair);
       // What is needed grows with the time: of what was asked the beginning may hold.
       double high_s = end_s;
       for (int i = 0; i < 20 && here_m > 0; ++i) {
@@ -397,17 +415,9 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
 
 }  // namespace
 
-struct PathSearch::Impl {
-  PathDistances distances;
-};
-
-PathSearch::PathSearch() : impl_(std::make_unique<Impl>()) {}
-PathSearch::~PathSearch() = default;
-PathSearch::PathSearch(PathSearch&& other) noexcept = default;
-PathSearch& PathSearch::operator=(PathSearch&& other) noexcept = default;
-
 AlongPath PathSearch::run(const Outcome& outcome, const Options& options, const std::vector<SpeedBound>& bounds,
-                          const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline) {
+                          const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline,
+                          FirstTouch* first) {
   const ScopedFloatMode mode;
   AlongPath result;
   result.until = safeUntil(outcome, bounds);
@@ -416,7 +426,11 @@ AlongPath PathSearch::run(const Outcome& outcome, const Options& options, const 
   if (result.unused.empty()) result.unused = problemOf(path, outcome.step->bodies);
   if (!result.unused.empty()) return result;
   result.unused = whyTooFast(outcome, boundsOf(outcome, bounds), path);
-  if (result.unused.empty()) Search(outcome, options, bounds, law, path, deadline, impl_->distances).run(result);
+  if (!result.unused.empty()) return result;
+  if (!distances_) distances_ = std::make_shared<PathDistances>();
+  Search search(outcome, options, bounds, law, path, deadline, *distances_);
+  if (first) *first = search.firstTouch();
+  search.run(result);
   return result;
 }
 

@@ -32,6 +32,8 @@ struct PathPair {
   double allowed_s = 0;    ///< the time of the path that the scale takes which bounds alone allow
   bool may_scale = false;  ///< what is on the path slows down, and the other one has a bound
   bool may_stand = false;  ///< the standing rule is for it
+  bool touches = false;    ///< when the path begins
+  bool is_cut = false;     ///< the time that holds for it could be later: the search was at its end
   double leaves_s = 0;     ///< up to then it leaves what it touches
   PathDistances::Way way;
   struct Asked {

@@ -157,6 +157,8 @@ void PromiseWatch::keep(const Outcome& outcome) {
 
 void PromiseWatch::extend(const Outcome& outcome, const SafeUntil& later,
                           std::function<std::string(const Outcome&)> why_void) {
+  const bool is_less = later.until_ns < promise_.until_ns || later.others_until_ns < promise_.others_until_ns;
+  if (why_void_ && (is_less || !promise_.isPromise())) broken_ = "something else is intended now";
   promise_ = later;
   why_void_ = std::move(why_void);
   if (!step_ && promise_.isPromise()) keep(outcome);
