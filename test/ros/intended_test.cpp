@@ -165,13 +165,13 @@ TEST_F(Intended, APlannerAsksBeforeItSends) {
     EXPECT_TRUE(ros::service::call(name + "/would_touch", call));
     return call.response;
   };
-  // 0.1 m up in 1 s, less the tube, and the tip comes at 0.1 m/s.
-  const WouldTouch::Response up = ask(0.3), down = ask(0.05);
-  EXPECT_EQ(up.verdict, WouldTouch::Response::TOUCHES) << up.reason;
-  EXPECT_NEAR(up.first, (0.099 - 0.01) / 0.21, 0.03 * 0.42);
-  EXPECT_NEAR(up.point.z, 0.17, 0.03);
-  EXPECT_EQ(down.verdict, WouldTouch::Response::TOUCHES) << "in 2 s the tip may be there";
-  EXPECT_GT(down.first, up.first);
+  // The mesh below, at 0.1 m/s, and the tube, which grows by 0.01 m/s, come towards what comes down at 0.1 m/s, or rests.
+  const WouldTouch::Response down = ask(-0.1), rests = ask(0.1);
+  EXPECT_EQ(down.verdict, WouldTouch::Response::TOUCHES) << down.reason;
+  EXPECT_NEAR(down.first, (0.099 - 0.01) / 0.21, 0.03 * 0.42);
+  EXPECT_NEAR(down.point.z, (0.099 - 0.042) / 2, 0.002);
+  EXPECT_EQ(rests.verdict, WouldTouch::Response::TOUCHES) << rests.reason;
+  EXPECT_NEAR(rests.first, (0.099 - 0.01) / 0.11, 0.03 * 0.81);
   EXPECT_FALSE(paths.last().used);
   pauses = true;
   EXPECT_TRUE(waitUntil([&] { return scales.last().reason.find("not proved") != std::string::npos; }));

@@ -113,7 +113,7 @@ TwistStamped twist(double begin_s, const std::string& frame, double z, double tu
 struct Lift {
   explicit Lift(double deviation_m = 0.01, bool with_table = false, const std::string& hand = "")
       : driven(
-            robotScene(with_table ? "max_speed_m_s: 1, against_map: true" : "max_speed_m_s: 1",
+            robotScene(with_table ? "max_speed_m_s: 1, against_map: true, own_voxels_m: 0" : "max_speed_m_s: 1",
                        std::string(with_table ? "" : "effects: {octomap: 'off'}, ") +
                            "intent: {horizon_s: 1, deviation_m: " + std::to_string(deviation_m) +
                            ", deviation_rate_m_s: 0.01}, speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}, "
@@ -317,12 +317,11 @@ TEST(IntendedMotion, APromiseDoesNotOutliveItsMotionButNeverGetsLessThanByBounds
   EXPECT_NEAR(lift.promised(), bounds_s, 1e-3);
   EXPECT_EQ(pipeline.promises().broken(), "something else is intended now");
   EXPECT_NE(pipeline.intended().along.unused, "");
-  EXPECT_LT(pipeline.speedScale(lift.driven.outcome).scale, 1);
   // The promise that is left is looked at, and that the plate went another way than was meant is nobody's fault.
   lift.step(1.2, 0.14);
   EXPECT_EQ(pipeline.promises().broken(), "");
   EXPECT_EQ(pipeline.promises().counts().broken, 0u);
-  EXPECT_EQ(pipeline.promises().counts().kept, 2u);
+  EXPECT_EQ(pipeline.promises().counts().kept, 1u);
   // What a reset took away no motion brings back.
   begin(1.3);
   pipeline.reset(StepStatus::RESET, "reset");
