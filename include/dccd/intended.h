@@ -32,6 +32,8 @@ struct IntendedPath {
   double endsAt() const { return time_s.empty() ? 0 : time_s.back(); }
   double tubeAt(double ahead_s) const { return deviation_m + deviation_rate_m_s * ahead_s; }
   bool has(std::uint16_t body) const;
+  std::size_t pieceAt(double at_s) const;  ///< that holds the time; the last one at the end
+  double shareAt(std::size_t piece, double at_s) const;
 };
 
 /// Why nothing follows from the path for these bodies, a clause; empty: it may be used.
@@ -69,7 +71,6 @@ enum class PathContact : std::uint8_t {
   TOUCHES_AND_APPROACHES = 1,
   TOUCHES_AND_LEAVES = 2,  ///< they touch at the surface, and on the path they come no nearer
 };
-DCCD_EXPORT const char* toString(PathContact contact);
 
 class PathDistances;
 
