@@ -188,13 +188,14 @@ std::optional<IntendedPath> IntendedMotion::from(const Step& step, const std::ve
 std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
                                                             const Lookup& lookup) {
   Motion& motion = motions_.front();
-  const std::set<std::string> named(motion.joints.begin(), motion.joints.end());
   std::vector<CarriedBody> on_it;
   for (const CarriedBody& one : carried) {
     if (!tree_->hasLink(one.frame)) continue;
     const std::set<std::string> joints = tree_->jointsTo(one.frame);
-    if (!joints.empty() && std::includes(named.begin(), named.end(), joints.begin(), joints.end()))
-      on_it.push_back(one);
+    const auto named = std::count_if(motion.joints.begin(), motion.joints.end(),
+                                     [&](const std::string& name) { return joints.count(name) > 0; });
+    if (named > 0 && joints.size() > static_cast<std::size_t>(named)) moved_by_others_ = one.frame;
+    if (named > 0 && joints.size() == static_cast<std::size_t>(named)) on_it.push_back(one);
   }
   const std::optional<Eigen::Isometry3d> base = lookup(tree_->root(), step.stamp_ns);
   if (on_it.empty() || !base) {
@@ -255,17 +256,11 @@ IntendedPath IntendedMotion::asked(trajectory_msgs::JointTrajectory message, con
   message.header.stamp.fromNSec(static_cast<std::uint64_t>(step.stamp_ns));
   problem = alone.take(message, step.stamp_ns);
   if (!problem.empty()) return {};
-  const std::set<std::string> named(message.joint_names.begin(), message.joint_names.end());
-  for (const CarriedBody& one : carried) {
-    std::size_t others = 0;
-    const std::set<std::string> joints = tree_->hasLink(one.frame) ? tree_->jointsTo(one.frame) : named;
-    for (const std::string& joint : joints) others += named.count(joint) == 0;
-    if (others > 0 && others < joints.size()) problem = "joint_names: they move '" + one.frame + "', but not alone";
-  }
-  if (alone.motions_[0].duration_s > MOST_PROMISED_S) problem = clause("it lasts longer than ", MOST_PROMISED_S, " s");
-  if (!problem.empty()) return {};
+  const bool is_long = alone.motions_[0].duration_s > MOST_PROMISED_S;
   const std::optional<IntendedPath> path = alone.from(step, carried, lookup);
   problem = alone.takeProblem();
+  if (!alone.moved_by_others_.empty()) problem = "joint_names: they move '" + alone.moved_by_others_ + "', but not alone";
+  if (is_long) problem = clause("it lasts longer than ", MOST_PROMISED_S, " s");
   return path.value_or(IntendedPath());
 }
 

@@ -79,7 +79,7 @@ class IntendedMotion {
   std::optional<JointTree> tree_;
   std::string no_tree_;  // why there is none
   std::deque<Motion> motions_;
-  std::string problem_;
+  std::string problem_, moved_by_others_;  // the latter: a frame, by other joints, too
 
   std::string add(Motion motion, std::string problem, StampNs newest_ns);
   std::string segmentsOf(const trajectory_msgs::JointTrajectory& message, Motion& motion) const;

@@ -22,11 +22,13 @@ std::vector<CarriedBody> MonitorPipeline::carriedBodies() const {
   return carried;
 }
 
-std::optional<Eigen::Isometry3d> MonitorPipeline::placeOf(const std::string& frame, StampNs stamp_ns) {
-  Eigen::Isometry3d fixed_from_frame = Eigen::Isometry3d::Identity();
-  std::string reason;
-  if (!transforms_.lookup(fixed_frame_, frame, stamp_ns, fixed_from_frame, reason)) return std::nullopt;
-  return fixed_from_frame;
+IntendedMotion::Lookup MonitorPipeline::places() {
+  return [this](const std::string& frame, StampNs stamp_ns) -> std::optional<Eigen::Isometry3d> {
+    Eigen::Isometry3d fixed_from_frame = Eigen::Isometry3d::Identity();
+    std::string reason;
+    if (!transforms_.lookup(fixed_frame_, frame, stamp_ns, fixed_from_frame, reason)) return std::nullopt;
+    return fixed_from_frame;
+  };
 }
 
 /// What is published waits for it.
@@ -39,8 +41,7 @@ AlongPath MonitorPipeline::searchAlong(const IntendedPath& path, FirstTouch* fir
 /// Returns whether the next answer shows that what is said along the path was not so; none: it rests on bounds alone.
 MonitorPipeline::WhyVoid MonitorPipeline::lookAlong() {
   const Step& step = *answered_->step;
-  const auto lookup = [this](const std::string& frame, StampNs stamp_ns) { return placeOf(frame, stamp_ns); };
-  const std::optional<IntendedPath> path = motion_->from(step, carriedBodies(), lookup);
+  const std::optional<IntendedPath> path = motion_->from(step, carriedBodies(), places());
   if (!path) return nullptr;
   intended_.along = searchAlong(*path);
   intended_.path = *path;
@@ -87,9 +88,8 @@ deformable_ccd::WouldTouch::Response MonitorPipeline::wouldTouch(const trajector
                                                                  const std::string& unproved) {
   if (!unproved.empty()) return notProved(unproved);
   if (!answered_ || !statement_.assurance.proved) return notProved("the newest step is not proved");
-  const auto lookup = [this](const std::string& frame, StampNs stamp_ns) { return placeOf(frame, stamp_ns); };
   std::string problem;
-  const IntendedPath path = motion_->asked(trajectory, *answered_->step, carriedBodies(), lookup, problem);
+  const IntendedPath path = motion_->asked(trajectory, *answered_->step, carriedBodies(), places(), problem);
   FirstTouch first;
   if (problem.empty()) problem = searchAlong(path, &first).unused;
   auto answer = notProved(problem);

@@ -319,7 +319,7 @@ class MonitorPipeline {
   WhyVoid lookAlong();
   void followIntended();
   AlongPath searchAlong(const IntendedPath& path, FirstTouch* first = nullptr);
-  std::optional<Eigen::Isometry3d> placeOf(const std::string& frame, StampNs stamp_ns);
+  IntendedMotion::Lookup places();
   std::vector<CarriedBody> carriedBodies() const;
   void loadFiles();
   /// Whether the first map was occupied along a body, of each once: a camera's map may hold the body itself.
