@@ -137,9 +137,8 @@ void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
       hand(message->instantiate<geometry_msgs::TwistStamped>());
     } else {
       const std::string type = message->getDataType();
-      queue.command([this, type] {
-        complainOfIntended("has type " + type + "; it takes JointTrajectory and TwistStamped");
-      });
+      queue.command(
+          [this, type] { complainOfIntended("has type " + type + "; it takes JointTrajectory and TwistStamped"); });
     }
   } catch (const std::exception& error) {
     tellLost(private_node.resolveName("intended"), error);

@@ -234,7 +234,8 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
     addPieces(poses, end_s - from_s, acceleration, reach_m, bend_m_, MOST_PIECES, path);
   }
   if (!problemOf(path, step.bodies).empty()) return std::nullopt;
-  const double allowed_m = path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.before.stamp_ns), step.stamp_ns));
+  const double allowed_m =
+      path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.before.stamp_ns), step.stamp_ns));
   const PlaceOnPath place = placeOnPath(path, step, 0, now_s - from_s, allowed_m);
   if (!(place.off_m <= allowed_m)) {
     drop(clause("does not hold: the robot is ", place.off_m, " m off it, and ", allowed_m,
@@ -259,7 +260,8 @@ IntendedPath IntendedMotion::asked(trajectory_msgs::JointTrajectory message, con
   const bool is_long = alone.motions_[0].duration_s > MOST_PROMISED_S;
   const std::optional<IntendedPath> path = alone.from(step, carried, lookup);
   problem = alone.takeProblem();
-  if (!alone.moved_by_others_.empty()) problem = "joint_names: they move '" + alone.moved_by_others_ + "', but not alone";
+  if (!alone.moved_by_others_.empty())
+    problem = "joint_names: they move '" + alone.moved_by_others_ + "', but not alone";
   if (is_long) problem = clause("it lasts longer than ", MOST_PROMISED_S, " s");
   return path.value_or(IntendedPath());
 }

@@ -1,4 +1,5 @@
-// The pipeline's part for what is intended: what follows from it for the newest answer, and what would from another one.
+// The pipeline's part for what is intended: what follows from it for the newest answer, and what would from another
+// one.
 #include <limits>
 #include <sstream>
 #include <tuple>
@@ -101,7 +102,8 @@ deformable_ccd::WouldTouch::Response MonitorPipeline::wouldTouch(const trajector
   answer.reason = "nothing touches on all of it";
   if (!first.body) return answer;
   putNames(*first.body, answered_->step->bodies, answer.bodies);
-  std::tie(answer.point.x, answer.point.y, answer.point.z) = std::tie(first.point.x(), first.point.y(), first.point.z());
+  std::tie(answer.point.x, answer.point.y, answer.point.z) =
+      std::tie(first.point.x(), first.point.y(), first.point.z());
   answer.reason = first.unknown.empty() ? "they may touch then" : "they may touch, " + first.unknown;
   return answer;
 }

@@ -17,8 +17,8 @@ namespace dccd {
 inline double roundedDown(double value) { return std::nextafter(value, 0.0); }  // of what is 0 or more
 inline double roundedUp(double value) { return std::nextafter(value, SpeedBound::NONE); }
 
-/// Between a value of which `holds` holds and one of which it does not: two that are next to each other, or what is left
-/// of these after so many halvings. Where it holds of a value it does of all that are less.
+/// Between a value of which `holds` holds and one of which it does not: two that are next to each other, or what is
+/// left of these after so many halvings. Where it holds of a value it does of all that are less.
 template <class Holds>
 std::pair<double, double> halved(double low, double high, const Holds& holds, int times = 5000) {
   for (; times > 0; --times) {

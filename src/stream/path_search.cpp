@@ -228,7 +228,9 @@ class Search {
     double known_s = is_whole ? to_s : upTo(0, last_s, holds, may_halve);
     // What is needed grows with the time: of what was asked last the beginning may hold.
     if (known_s < last_s && here_m > 0)
-      known_s = halved(known_s, open_s, [&](double time_s) { return needs(goal, pair, time_s) <= here_m; }, 20).first;
+      known_s = halved(
+                    known_s, open_s, [&](double time_s) { return needs(goal, pair, time_s) <= here_m; }, 20)
+                    .first;
     holds_s = std::max(holds_s, known_s);
     if (may_stand) holds_s = std::max(holds_s, pair.stands_s);
     if (may_stand && holds_s < to_s) holds_s = std::max(holds_s, leaves(pair, to_s));

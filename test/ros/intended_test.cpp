@@ -165,7 +165,8 @@ TEST_F(Intended, APlannerAsksBeforeItSends) {
     EXPECT_TRUE(ros::service::call(name + "/would_touch", call));
     return call.response;
   };
-  // The mesh below, at 0.1 m/s, and the tube, which grows by 0.01 m/s, come towards what comes down at 0.1 m/s, or rests.
+  // The mesh below, at 0.1 m/s, and the tube, which grows by 0.01 m/s, come towards what comes down at 0.1 m/s, or
+  // rests.
   const WouldTouch::Response down = ask(-0.1), rests = ask(0.1);
   EXPECT_EQ(down.verdict, WouldTouch::Response::TOUCHES) << down.reason;
   EXPECT_NEAR(down.first, (0.099 - 0.01) / 0.21, 0.03 * 0.42);

@@ -112,13 +112,12 @@ TwistStamped twist(double begin_s, const std::string& frame, double z, double tu
 /// A cloth that is held over the plate, and a monitor that listens.
 struct Lift {
   explicit Lift(double deviation_m = 0.01, bool with_table = false, const std::string& hand = "")
-      : driven(
-            robotScene(with_table ? "max_speed_m_s: 1, against_map: true, own_voxels_m: 0" : "max_speed_m_s: 1",
-                       std::string(with_table ? "" : "effects: {octomap: 'off'}, ") +
-                           "intent: {horizon_s: 1, deviation_m: " + std::to_string(deviation_m) +
-                           ", deviation_rate_m_s: 0.01}, speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}, "
-                           "bodies: {cloth: {topic: cloth, topology: {rows: 2, cols: 2}, max_speed_m_s: 0.1}}"),
-            loads(liftUrdf(hand))) {
+      : driven(robotScene(with_table ? "max_speed_m_s: 1, against_map: true, own_voxels_m: 0" : "max_speed_m_s: 1",
+                          std::string(with_table ? "" : "effects: {octomap: 'off'}, ") +
+                              "intent: {horizon_s: 1, deviation_m: " + std::to_string(deviation_m) +
+                              ", deviation_rate_m_s: 0.01}, speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}, "
+                              "bodies: {cloth: {topic: cloth, topology: {rows: 2, cols: 2}, max_speed_m_s: 0.1}}"),
+               loads(liftUrdf(hand))) {
     driven.raise("base", 0);
     if (with_table) driven.giveMap(1);
   }
