@@ -31,8 +31,8 @@ struct IntendedPath {
 
   double endsAt() const { return time_s.empty() ? 0 : time_s.back(); }
   double tubeAt(double ahead_s) const { return deviation_m + deviation_rate_m_s * ahead_s; }
-  bool has(std::uint16_t body) const;
-  std::size_t pieceAt(double at_s) const;  ///< that holds the time; the last one at the end
+  const Of* find(std::uint16_t body) const;  ///< null: it is not on it
+  std::size_t pieceAt(double at_s) const;    ///< that holds the time; the last one at the end
   double shareAt(std::size_t piece, double at_s) const;
 };
 

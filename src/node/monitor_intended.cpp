@@ -39,37 +39,31 @@ AlongPath MonitorPipeline::searchAlong(const IntendedPath& path, FirstTouch* fir
   return path_search_.run(*answered_, options, speedBounds(), config_.speed_law, path, deadline, first);
 }
 
-/// Returns whether the next answer shows that what is said along the path was not so; none: it rests on bounds alone.
-MonitorPipeline::WhyVoid MonitorPipeline::lookAlong() {
-  const Step& step = *answered_->step;
-  const std::optional<IntendedPath> path = motion_->from(step, carriedBodies(), places());
-  if (!path) return nullptr;
-  intended_.along = searchAlong(*path);
-  intended_.path = *path;
-  if (!intended_.along.rests_on_path) return nullptr;
-  return [path = beginningAt(*path, step), stamp_ns = answered_->stamp_ns](const Outcome& next) {
-    const double ahead_s = secondsBetween(stamp_ns, next.stamp_ns);
-    const PlaceOnPath place = placeOnPath(path, *next.step, 0, ahead_s);
-    if (place.off_m <= path.tubeAt(ahead_s)) return std::string();
-    std::ostringstream text;
-    text << "the robot was " << place.off_m << " m off the intended path, and " << path.tubeAt(ahead_s)
-         << " m are allowed";
-    return text.str();
-  };
-}
-
 /// Whatever it throws, what the bounds alone allow stands.
 void MonitorPipeline::followIntended() {
+  const Step& step = *answered_->step;
   intended_ = {};
   intended_.along.until = safeUntil(*answered_, speedBounds());
   intended_.along.unused = "no path is in force";
-  WhyVoid why_void;
+  std::function<std::string(const Outcome&)> why_void;  // as the next answer tells
   try {
-    why_void = lookAlong();
+    if (const std::optional<IntendedPath> path = motion_->from(step, carriedBodies(), places())) {
+      Intended found{*path, searchAlong(*path)};
+      why_void = [path = beginningAt(*path, step), stamp_ns = answered_->stamp_ns](const Outcome& next) {
+        const double ahead_s = secondsBetween(stamp_ns, next.stamp_ns);
+        const PlaceOnPath place = placeOnPath(path, *next.step, 0, ahead_s);
+        if (place.off_m <= path.tubeAt(ahead_s)) return std::string();
+        std::ostringstream text;
+        text << "the robot was " << place.off_m << " m off the intended path, and " << path.tubeAt(ahead_s)
+             << " m are allowed";
+        return text.str();
+      };
+      intended_ = std::move(found);
+    }
   } catch (const std::exception& error) {
     intended_.along.unused = std::string("a fault of the monitor: ") + error.what();
   }
-  promises_.extend(*answered_, intended_.along.until, why_void);
+  promises_.extend(*answered_, intended_.along.until, intended_.along.rests_on_path ? why_void : nullptr);
 }
 
 const Outcome* MonitorPipeline::reconsider() {

@@ -315,8 +315,6 @@ class MonitorPipeline {
     intends_anew_ = motion_.has_value();
     return motion_ ? motion_->take(message, answered_ ? answered_->stamp_ns : 0) : std::string();
   }
-  using WhyVoid = std::function<std::string(const Outcome&)>;
-  WhyVoid lookAlong();
   void followIntended();
   AlongPath searchAlong(const IntendedPath& path, FirstTouch* first = nullptr);
   IntendedMotion::Lookup places();

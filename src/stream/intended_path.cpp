@@ -20,8 +20,9 @@ bool isAllFinite(const Body& body) {
 
 }  // namespace
 
-bool IntendedPath::has(std::uint16_t body) const {
-  return std::any_of(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });
+const IntendedPath::Of* IntendedPath::find(std::uint16_t body) const {
+  const auto found = std::find_if(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });
+  return found == bodies.end() ? nullptr : &*found;
 }
 
 std::size_t IntendedPath::pieceAt(double at_s) const {

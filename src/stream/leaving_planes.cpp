@@ -69,12 +69,9 @@ LeavingPlanes::LeavingPlanes(const Outcome& outcome, const PathPair& pair, const
                              const PathPace& pace)
     : outcome_(outcome), pair_(pair) {
   const std::vector<Body>& bodies = outcome.step->bodies;
-  for (const IntendedPath::Of& of : path.bodies) {
-    if (of.body != pair.body[0] && of.body != pair.body[1]) continue;
-    mover_ = of.body;
-    partner_ = pair.body[pair.body[0] == mover_];
-    follow(path, of, most_s);
-  }
+  mover_ = pair.body[path.find(pair.body[0]) == nullptr];
+  partner_ = pair.body[pair.body[0] == mover_];
+  follow(path, *path.find(mover_), most_s);
   const bool on_map = partner_ == OBSTACLE_BODY;
   if (on_map) to_map_ = outcome.step->map.map_from_fixed;
   double largest = 1;

@@ -57,9 +57,8 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
     one.still = one.moving;
   }
   one.is_known = true;
-  one.pose = nullptr;
-  for (const IntendedPath::Of& of : path_->bodies)
-    if (of.body == number) one.pose = &of.pose;
+  const IntendedPath::Of* const of = path_->find(number);
+  one.pose = of ? &of->pose : nullptr;
   const Eigen::Isometry3d to_local = one.pose ? body.pose_t1.inverse() : Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3d box(Vec3::Zero());
   box.setEmpty();

@@ -98,7 +98,7 @@ class Search {
       bool slows = true;
       for (const std::uint16_t body : row.body) {
         if (body == OBSTACLE_BODY) continue;
-        if (path_.has(body)) {
+        if (path_.find(body)) {
           ++pair.on_path;
           slows = slows && full_[body].slows_down;
         } else {
@@ -227,10 +227,8 @@ class Search {
     if (!is_whole && may_stand && stands(pair, to_s)) return to_s;
     double known_s = is_whole ? to_s : upTo(0, last_s, holds, may_halve);
     // What is needed grows with the time: of what was asked last the beginning may hold.
-    if (known_s < last_s && here_m > 0)
-      known_s = halved(
-                    known_s, open_s, [&](double time_s) { return needs(goal, pair, time_s) <= here_m; }, 20)
-                    .first;
+    const auto is_enough = [&](double time_s) { return needs(goal, pair, time_s) <= here_m; };
+    if (known_s < last_s && here_m > 0) known_s = halved(known_s, open_s, is_enough, 20).first;
     holds_s = std::max(holds_s, known_s);
     if (may_stand) holds_s = std::max(holds_s, pair.stands_s);
     if (may_stand && holds_s < to_s) holds_s = std::max(holds_s, leaves(pair, to_s));
