@@ -50,16 +50,6 @@ JointPace paceOf(const std::array<double, 4>& b, double lasts_s) {
   return pace;
 }
 
-bool allFinite(const geometry_msgs::Vector3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-double largestReach(const std::vector<CarriedBody>& bodies) {
-  double largest = 0;
-  for (const CarriedBody& body : bodies) largest = std::max(largest, body.reach_m);
-  return largest;
-}
-
 }  // namespace
 
 IntendedMotion::IntendedMotion(const IntentConfig& limits, const std::string& description, double bend_m)
@@ -134,8 +124,8 @@ std::string IntendedMotion::take(const geometry_msgs::TwistStamped& message, Sta
   motion.angular = Vec3(w.x, w.y, w.z);
   std::string problem;
   if (motion.frame.empty()) problem = "header/frame_id is empty";
-  if (!allFinite(v)) problem = clause("twist/linear is (", v.x, ", ", v.y, ", ", v.z, ")");
-  if (!allFinite(w)) problem = clause("twist/angular is (", w.x, ", ", w.y, ", ", w.z, ")");
+  if (!motion.linear.allFinite()) problem = clause("twist/linear is (", v.x, ", ", v.y, ", ", v.z, ")");
+  if (!motion.angular.allFinite()) problem = clause("twist/angular is (", w.x, ", ", w.y, ", ", w.z, ")");
   return add(std::move(motion), std::move(problem), newest_ns);
 }
 
@@ -208,7 +198,8 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
   double until_s = std::min(motion.duration_s, now_s + limits_.horizon_s);
   if (motions_.size() > 1) until_s = std::min(until_s, secondsBetween(motion.begin_ns, motions_[1].begin_ns));
   IntendedPath path = emptyPath(on_it);
-  const double reach_m = largestReach(on_it);
+  double reach_m = 0;
+  for (const CarriedBody& one : on_it) reach_m = std::max(reach_m, one.reach_m);
   for (const Segment& segment : motion.segments) {
     const double end_s = std::min(segment.end_s, until_s), lasts_s = segment.end_s - segment.begin_s;
     if (segment.end_s <= from_s || end_s <= segment.begin_s) continue;
@@ -282,10 +273,11 @@ std::optional<IntendedPath> IntendedMotion::byTwists(const Step& step, const std
     drop("header/frame_id '" + frame + "' " + (begin ? "carries nothing that is watched" : "has no place"));
     return std::nullopt;
   }
-  double far_m = 0;
+  double far_m = 0, reach_m = 0;
   std::vector<Eigen::Isometry3d> from_frame;
   for (const CarriedBody& one : on_it) {
     from_frame.push_back(begin->inverse() * step.bodies[one.body].pose_t1);
+    reach_m = std::max(reach_m, one.reach_m);
     far_m = std::max(far_m, from_frame.back().translation().norm() + one.reach_m);
   }
   IntendedPath path = emptyPath(on_it);
@@ -302,8 +294,7 @@ std::optional<IntendedPath> IntendedMotion::byTwists(const Step& step, const std
       for (const Eigen::Isometry3d& body : from_frame) all.push_back(moved * body);
       return all;
     };
-    addPieces(poses, until_s, turns * (motion.linear.norm() + turns * far_m), largestReach(on_it), bend_m_, MOST_PIECES,
-              path);
+    addPieces(poses, until_s, turns * (motion.linear.norm() + turns * far_m), reach_m, bend_m_, MOST_PIECES, path);
     at = at * screw(motion.linear, motion.angular, until_s - begins_s);
     if (end_ns == motion.endNs()) break;
   }

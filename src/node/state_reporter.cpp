@@ -126,11 +126,7 @@ void StateReporter::tellSpeed(const Outcome& outcome, const SpeedScale& speed) {
 
 std::string StateReporter::whyNotProved() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  Assurance assurance = answer_.assurance;
-  std::vector<std::string> sentences;
-  for (Fault& fault : liveness_.faults(clock_.now())) sentences.push_back(std::move(fault.sentence));
-  assurance.hinder(sentences);
-  return assurance.proved ? "" : assurance.missing.front();
+  return unproved_;
 }
 
 void StateReporter::asked(const std::string& what) {
@@ -198,6 +194,7 @@ void StateReporter::say(bool always) {
   if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
   Statement statement = answer_;
   statement.assurance.hinder(sentences);
+  unproved_ = statement.assurance.proved ? "" : statement.assurance.missing.front();
   if (!statement.is_doubts_fault) statement.hint = joined(statement.hint, hint_);
   // What is published as an object wakes roscpp's thread only where somebody listens: that thread takes locks, and
   // perhaps the core, from the worker, which has yet to publish the contacts.

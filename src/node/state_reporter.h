@@ -63,7 +63,7 @@ class StateReporter {
   void tell(const Outcome& outcome, const Statement& statement, const std::string& frame, const SpeedScale& speed);
   /// Of the step that was told last: what it allows now.
   void tellSpeed(const Outcome& outcome, const SpeedScale& speed);
-  /// Why nothing is proved now; empty: what was told last is.
+  /// Why ~state says that nothing is proved; empty: it says that it is.
   std::string whyNotProved();
   /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
   void setHint(const std::string& hint);
@@ -98,7 +98,7 @@ class StateReporter {
   double stamp_age_s_ = 0;                 // of its frame, when it was told
   std::int64_t told_ns_ = 0;               // when that was, on the watch's clock
   bool slowed_ = false;                    // by its age, as it was said last
-  std::string hint_;
+  std::string hint_, unproved_;
   std::vector<Fault::Kind> hinders_;  // what was said to stand in its way
   bool stopped_ = false;
   std::thread thread_;

@@ -160,10 +160,10 @@ PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_
 
 IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double lasts_s) {
   constexpr double NO_TIME_S = 1e-9;  // of a piece
-  IntendedPath rest;
-  rest.deviation_m = path.deviation_m;
-  rest.deviation_rate_m_s = path.deviation_rate_m_s;
-  for (const IntendedPath::Of& of : path.bodies) rest.bodies.push_back({of.body, {}});
+  IntendedPath rest = path;
+  rest.time_s.clear();
+  rest.bend_m.clear();
+  for (IntendedPath::Of& of : rest.bodies) of.pose.clear();
   from_s = std::max(0.0, from_s);
   by_s = std::max(from_s, by_s);
   const double until_s = std::min(path.endsAt(), by_s + lasts_s);
