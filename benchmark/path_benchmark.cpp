@@ -136,7 +136,7 @@ nlohmann::json measure(const Panda& panda, const Scene& scene, int runs) {
           {"bodies", step.bodies.size()},
           {"ms", spread(ms)},
           {"searches", along.searches},
-          {"contact", toString(along.contact)},
+          {"contact", static_cast<int>(along.contact)},
           {"until_s", along.until.seconds()},
           {"scale", along.scale.scale},
           {"until_by_bounds_s", safeUntil(outcome, bounds).seconds()},

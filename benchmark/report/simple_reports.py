@@ -358,10 +358,16 @@ def write_slow(folder, result):
              str(row["contacts"][1]), str(row["arrived"][1]), between(row["mean_speed_m_s"]), between(row["ours_faster_by_m_s"])] if "seeds" in row else
             [row["law"], "all touch", str(row["tried"]), "", "", "", "", "", "", ""] for row in result["rows"]]
     write_rows(os.path.join(folder, "slow.csv"), header, rows)
+    task_header = ["task", "scale", "runs", "with a contact", "arrived", "mean speed m/s", "of the free one"]
+    tasks = [[row["task"], {"intended": "with ~intended", "bounds": "by bounds alone"}[how], str(row["seeds"]), str(row[how]["contacts"]),
+              str(row[how]["arrived"]), between(row[how]["mean_speed_m_s"]), between(row[how]["share_of_free"])]
+             for row in result["intended"] for how in ("intended", "bounds")]
+    write_rows(os.path.join(folder, "intended.csv"), task_header, tasks)
     return save(folder, "slow", "# Slow down instead of stop\n\nA simulated arm carries a cloth over a post and up to a wall, %d times "
                 "steadily, and as often creeping, at rest and setting off again. Of the other laws stand the numbers that are the fastest "
                 "without a contact in either. Speeds are of the steady arm; ± is an interval of 95 %%. The latency, measured in the loop: at "
-                "most %.3f s; the cloth: at most %.2f m/s.\n\n" % (result["seeds"], result["latency_s"], result["cloth_m_s"]) + table(header, rows))
+                "most %.3f s; the cloth: at most %.2f m/s.\n\n" % (result["seeds"], result["latency_s"], result["cloth_m_s"]) + table(header, rows) +
+                "\nWhere bounds alone let the arm do nothing:\n\n" + table(task_header, tasks))
 
 
 def write_latency(folder, result):

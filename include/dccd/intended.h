@@ -31,7 +31,9 @@ struct IntendedPath {
 
   double endsAt() const { return time_s.empty() ? 0 : time_s.back(); }
   double tubeAt(double ahead_s) const { return deviation_m + deviation_rate_m_s * ahead_s; }
-  bool has(std::uint16_t body) const;
+  const Of* find(std::uint16_t body) const;  ///< null: it is not on it
+  std::size_t pieceAt(double at_s) const;    ///< that holds the time; the last one at the end
+  double shareAt(std::size_t piece, double at_s) const;
 };
 
 /// Why nothing follows from the path for these bodies, a clause; empty: it may be used.
@@ -69,7 +71,8 @@ enum class PathContact : std::uint8_t {
   TOUCHES_AND_APPROACHES = 1,
   TOUCHES_AND_LEAVES = 2,  ///< they touch at the surface, and on the path they come no nearer
 };
-DCCD_EXPORT const char* toString(PathContact contact);
+
+class PathDistances;
 
 /// What follows from a path beside the bounds: never less than from these alone.
 struct AlongPath {
@@ -79,6 +82,14 @@ struct AlongPath {
   bool rests_on_path = false;               ///< `until` is later than without one
   std::string unused;                       ///< why the path says nothing; empty: it was used
   std::size_t searches = 0;                 ///< of a pair's distance over a stretch of the path
+};
+
+/// What is on a path touches nothing of which the outcome speaks before free_s [s], by the theorem below.
+struct FirstTouch {
+  double free_s = 0;
+  std::optional<std::array<std::uint16_t, 2>> body;  ///< which two may touch then; none: all of the path is free
+  Vec3 point = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());  ///< where the two are nearest then
+  std::string unknown;  ///< why free_s is no more, where that is for want of knowledge
 };
 
 /// Until when, and how fast, on a path that begins where the step ends.
@@ -112,19 +123,14 @@ class DCCD_EXPORT PathSearch {
   /// Stretches of the path that are searched for one pair, at most; what is left out is not promised.
   static constexpr std::size_t MOST_SEARCHES = 96;
 
-  PathSearch();
-  ~PathSearch();
-  PathSearch(PathSearch&& other) noexcept;
-  PathSearch& operator=(PathSearch&& other) noexcept;
-
-  /// `options`: those of the outcome. Once the deadline is over what was found until then holds. Throws as safeUntil()
-  /// and speedScale() do.
+  /// `options`: those of the outcome. Once the deadline is over what was found until then holds. `first`: is filled
+  /// where the path is used. Throws as safeUntil() and speedScale() do.
   AlongPath run(const Outcome& outcome, const Options& options, const std::vector<SpeedBound>& bounds,
-                const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline = {});
+                const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline = {},
+                FirstTouch* first = nullptr);
 
  private:
-  struct DCCD_HIDDEN Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<PathDistances> distances_;  // what lasts from run to run, which saves time alone
 };
 
 }  // namespace dccd

@@ -87,8 +87,9 @@ class DCCD_EXPORT PromiseWatch {
   void setBounds(std::vector<SpeedBound> bounds) { bounds_ = std::move(bounds); }
   /// The next promise, after a look at the last one. Of an outcome without an answer none, and the last one stands.
   const SafeUntil& follow(const Outcome& outcome);
-  /// What follow() made of this outcome is this later promise, which rests on something more: `why_void` says of the
-  /// next answer, if that comes before the promise ends, why that was not so; empty: it was.
+  /// What follow() made of this outcome, the newest answer, is this promise, no earlier than by bounds alone. If it
+  /// rests on something more `why_void` says of the next answer, if that comes before the promise ends, why that was
+  /// not so; empty: it was. A second one takes the first one's place; broken() tells where it is earlier.
   void extend(const Outcome& outcome, const SafeUntil& later, std::function<std::string(const Outcome&)> why_void);
   /// What the promise rests on has changed, as which contacts are expected, or which bodies there are: it is void from
   /// now on, and the next answer says so. `why`: a sentence. Without a promise that stands nothing happens.

@@ -1,5 +1,7 @@
 #include "node/collision_monitor_impl.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cstdlib>
 #include <utility>
 
@@ -125,10 +127,9 @@ void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
   const auto hand = [this](const auto& motion) {
     queue.command([this, motion] {
       const std::string problem = pipeline.intend(*motion);
-      if (!problem.empty()) log.complain("intended", private_node.resolveName("intended"), problem);
+      if (!problem.empty()) complainOfIntended(problem);
     });
   };
-  const std::string topic = private_node.resolveName("intended");
   try {
     if (message->getDataType() == ros::message_traits::datatype<trajectory_msgs::JointTrajectory>()) {
       hand(message->instantiate<trajectory_msgs::JointTrajectory>());
@@ -136,13 +137,19 @@ void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
       hand(message->instantiate<geometry_msgs::TwistStamped>());
     } else {
       const std::string type = message->getDataType();
-      queue.command([this, topic, type] {
-        log.complain("intended", topic, "has type " + type + "; it takes JointTrajectory and TwistStamped");
-      });
+      queue.command(
+          [this, type] { complainOfIntended("has type " + type + "; it takes JointTrajectory and TwistStamped"); });
     }
   } catch (const std::exception& error) {
-    tellLost(topic, error);
+    tellLost(private_node.resolveName("intended"), error);
   }
+}
+
+/// A kind of mistake is what is said of it up to the first name, but for numbers: these make no line of their own.
+void CollisionMonitor::Impl::complainOfIntended(const std::string& problem) {
+  std::string kind = problem.substr(0, problem.find('\''));
+  kind.erase(std::remove_if(kind.begin(), kind.end(), [](char c) { return !std::isalpha(c) && c != '/'; }), kind.end());
+  log.complain("intended " + kind, private_node.resolveName("intended"), problem);
 }
 
 void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {

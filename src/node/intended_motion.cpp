@@ -50,16 +50,6 @@ JointPace paceOf(const std::array<double, 4>& b, double lasts_s) {
   return pace;
 }
 
-bool allFinite(const geometry_msgs::Vector3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-double largestReach(const std::vector<CarriedBody>& bodies) {
-  double largest = 0;
-  for (const CarriedBody& body : bodies) largest = std::max(largest, body.reach_m);
-  return largest;
-}
-
 }  // namespace
 
 IntendedMotion::IntendedMotion(const IntentConfig& limits, const std::string& description, double bend_m)
@@ -120,10 +110,8 @@ std::string IntendedMotion::segmentsOf(const trajectory_msgs::JointTrajectory& m
 std::string IntendedMotion::take(const trajectory_msgs::JointTrajectory& message, StampNs newest_ns) {
   Motion motion;
   motion.begin_ns = static_cast<StampNs>(message.header.stamp.toNSec());
-  const std::string problem = segmentsOf(message, motion);
-  if (problem.empty()) return add(std::move(motion), newest_ns);
-  forget();
-  return problem;
+  std::string problem = segmentsOf(message, motion);
+  return add(std::move(motion), std::move(problem), newest_ns);
 }
 
 std::string IntendedMotion::take(const geometry_msgs::TwistStamped& message, StampNs newest_ns) {
@@ -136,16 +124,14 @@ std::string IntendedMotion::take(const geometry_msgs::TwistStamped& message, Sta
   motion.angular = Vec3(w.x, w.y, w.z);
   std::string problem;
   if (motion.frame.empty()) problem = "header/frame_id is empty";
-  if (!allFinite(v)) problem = clause("twist/linear is (", v.x, ", ", v.y, ", ", v.z, ")");
-  if (!allFinite(w)) problem = clause("twist/angular is (", w.x, ", ", w.y, ", ", w.z, ")");
-  if (problem.empty()) return add(std::move(motion), newest_ns);
-  forget();
-  return problem;
+  if (!motion.linear.allFinite()) problem = clause("twist/linear is (", v.x, ", ", v.y, ", ", v.z, ")");
+  if (!motion.angular.allFinite()) problem = clause("twist/angular is (", w.x, ", ", w.y, ", ", w.z, ")");
+  return add(std::move(motion), std::move(problem), newest_ns);
 }
 
-std::string IntendedMotion::add(Motion motion, StampNs newest_ns) {
-  std::string problem;
-  if (motion.begin_ns == 0) {
+std::string IntendedMotion::add(Motion motion, std::string problem, StampNs newest_ns) {
+  if (!problem.empty()) {
+  } else if (motion.begin_ns == 0) {
     problem = "header/stamp is 0: it says when the motion begins";
   } else if (motion.endNs() <= newest_ns) {
     problem = clause("header/stamp is late: the motion ended ", secondsBetween(motion.endNs(), newest_ns),
@@ -192,13 +178,14 @@ std::optional<IntendedPath> IntendedMotion::from(const Step& step, const std::ve
 std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
                                                             const Lookup& lookup) {
   Motion& motion = motions_.front();
-  const std::set<std::string> named(motion.joints.begin(), motion.joints.end());
   std::vector<CarriedBody> on_it;
   for (const CarriedBody& one : carried) {
     if (!tree_->hasLink(one.frame)) continue;
     const std::set<std::string> joints = tree_->jointsTo(one.frame);
-    if (!joints.empty() && std::includes(named.begin(), named.end(), joints.begin(), joints.end()))
-      on_it.push_back(one);
+    const auto named = std::count_if(motion.joints.begin(), motion.joints.end(),
+                                     [&](const std::string& name) { return joints.count(name) > 0; });
+    if (named > 0 && joints.size() > static_cast<std::size_t>(named)) moved_by_others_ = one.frame;
+    if (named > 0 && joints.size() == static_cast<std::size_t>(named)) on_it.push_back(one);
   }
   const std::optional<Eigen::Isometry3d> base = lookup(tree_->root(), step.stamp_ns);
   if (on_it.empty() || !base) {
@@ -206,11 +193,13 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
                        : "has no place: nobody knows where '" + tree_->root() + "' is");
     return std::nullopt;
   }
-  const double now_s = secondsBetween(motion.begin_ns, step.stamp_ns), from_s = motion.passed_s;
+  if (motion.last.stamp_ns < step.stamp_ns) motion.before = motion.last;
+  const double now_s = secondsBetween(motion.begin_ns, step.stamp_ns), from_s = motion.before.at_s;
   double until_s = std::min(motion.duration_s, now_s + limits_.horizon_s);
   if (motions_.size() > 1) until_s = std::min(until_s, secondsBetween(motion.begin_ns, motions_[1].begin_ns));
   IntendedPath path = emptyPath(on_it);
-  const double reach_m = largestReach(on_it);
+  double reach_m = 0;
+  for (const CarriedBody& one : on_it) reach_m = std::max(reach_m, one.reach_m);
   for (const Segment& segment : motion.segments) {
     const double end_s = std::min(segment.end_s, until_s), lasts_s = segment.end_s - segment.begin_s;
     if (segment.end_s <= from_s || end_s <= segment.begin_s) continue;
@@ -236,18 +225,36 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
     addPieces(poses, end_s - from_s, acceleration, reach_m, bend_m_, MOST_PIECES, path);
   }
   if (!problemOf(path, step.bodies).empty()) return std::nullopt;
-  const double allowed_m = path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.passed_ns), step.stamp_ns));
+  const double allowed_m =
+      path.tubeAt(secondsBetween(std::max(motion.begin_ns, motion.before.stamp_ns), step.stamp_ns));
   const PlaceOnPath place = placeOnPath(path, step, 0, now_s - from_s, allowed_m);
   if (!(place.off_m <= allowed_m)) {
     drop(clause("does not hold: the robot is ", place.off_m, " m off it, and ", allowed_m,
                 " m are allowed (intent/deviation_m)"));
     return std::nullopt;
   }
-  motion.passed_s = from_s + place.time_s;
-  motion.passed_ns = step.stamp_ns;
+  motion.last = {from_s + place.time_s, step.stamp_ns};
   // A robot that has fallen behind goes on by its motion only until the next one begins, or this one was to end.
   const StampNs end_ns = motions_.size() > 1 ? std::min(motion.endNs(), motions_[1].begin_ns) : motion.endNs();
   return restOf(path, place.time_s, place.last_s, std::min(limits_.horizon_s, secondsBetween(step.stamp_ns, end_ns)));
+}
+
+IntendedPath IntendedMotion::asked(trajectory_msgs::JointTrajectory message, const Step& step,
+                                   const std::vector<CarriedBody>& carried, const Lookup& lookup,
+                                   std::string& problem) const {
+  IntendedMotion alone(*this);
+  alone.forget();
+  alone.limits_.horizon_s = MOST_PROMISED_S;
+  message.header.stamp.fromNSec(static_cast<std::uint64_t>(step.stamp_ns));
+  problem = alone.take(message, step.stamp_ns);
+  if (!problem.empty()) return {};
+  const bool is_long = alone.motions_[0].duration_s > MOST_PROMISED_S;
+  const std::optional<IntendedPath> path = alone.from(step, carried, lookup);
+  problem = alone.takeProblem();
+  if (!alone.moved_by_others_.empty())
+    problem = "joint_names: they move '" + alone.moved_by_others_ + "', but not alone";
+  if (is_long) problem = clause("it lasts longer than ", MOST_PROMISED_S, " s");
+  return path.value_or(IntendedPath());
 }
 
 /// Each until the next one begins. A constant twist turns about one axis of space and slides along it.
@@ -266,10 +273,11 @@ std::optional<IntendedPath> IntendedMotion::byTwists(const Step& step, const std
     drop("header/frame_id '" + frame + "' " + (begin ? "carries nothing that is watched" : "has no place"));
     return std::nullopt;
   }
-  double far_m = 0;
+  double far_m = 0, reach_m = 0;
   std::vector<Eigen::Isometry3d> from_frame;
   for (const CarriedBody& one : on_it) {
     from_frame.push_back(begin->inverse() * step.bodies[one.body].pose_t1);
+    reach_m = std::max(reach_m, one.reach_m);
     far_m = std::max(far_m, from_frame.back().translation().norm() + one.reach_m);
   }
   IntendedPath path = emptyPath(on_it);
@@ -286,8 +294,7 @@ std::optional<IntendedPath> IntendedMotion::byTwists(const Step& step, const std
       for (const Eigen::Isometry3d& body : from_frame) all.push_back(moved * body);
       return all;
     };
-    addPieces(poses, until_s, turns * (motion.linear.norm() + turns * far_m), largestReach(on_it), bend_m_, MOST_PIECES,
-              path);
+    addPieces(poses, until_s, turns * (motion.linear.norm() + turns * far_m), reach_m, bend_m_, MOST_PIECES, path);
     at = at * screw(motion.linear, motion.angular, until_s - begins_s);
     if (end_ns == motion.endNs()) break;
   }

@@ -45,6 +45,10 @@ class IntendedMotion {
   /// that was in force is not any more, once.
   std::optional<IntendedPath> from(const Step& step, const std::vector<CarriedBody>& carried, const Lookup& lookup);
   std::string takeProblem() { return std::exchange(problem_, {}); }
+  /// What from() would make of this one alone, if it began at the step's end and MOST_PROMISED_S were the horizon; an
+  /// empty path where `problem` says why there is none.
+  IntendedPath asked(trajectory_msgs::JointTrajectory message, const Step& step,
+                     const std::vector<CarriedBody>& carried, const Lookup& lookup, std::string& problem) const;
   void forget() { motions_.clear(); }
 
  private:
@@ -61,20 +65,23 @@ class IntendedMotion {
     std::vector<Segment> segments;    // empty: a twist
     std::string frame;
     Vec3 linear, angular;
-    double passed_s = 0;    // of a trajectory, where the robot was last,
-    StampNs passed_ns = 0;  // and when
+    /// Of a trajectory: where the robot was.
+    struct Passed {
+      double at_s = 0;
+      StampNs stamp_ns = 0;
+    } last, before;  // the latter at a step before the last one
     bool isTwist() const { return segments.empty(); }
     StampNs endNs() const { return begin_ns + static_cast<StampNs>(1e9 * duration_s); }
   };
 
-  const IntentConfig limits_;
+  IntentConfig limits_;
   const double bend_m_;
   std::optional<JointTree> tree_;
   std::string no_tree_;  // why there is none
   std::deque<Motion> motions_;
-  std::string problem_;
+  std::string problem_, moved_by_others_;  // the latter: a frame, by other joints, too
 
-  std::string add(Motion motion, StampNs newest_ns);
+  std::string add(Motion motion, std::string problem, StampNs newest_ns);
   std::string segmentsOf(const trajectory_msgs::JointTrajectory& message, Motion& motion) const;
   std::optional<IntendedPath> alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
                                               const Lookup& lookup);

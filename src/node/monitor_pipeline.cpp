@@ -163,6 +163,7 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
 
 void MonitorPipeline::voidWhatWasSaid(const std::string& why) {
   promises_.revoke(why);
+  answered_.reset();
   changed_ = why;
   changed_ns_ = call_ns_;
   newest_ns_ = sources_[config_.monitor.clock_body].stamp_ns;
@@ -216,7 +217,13 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
     promises_.follow(outcome);
-    followIntended(outcome);
+    intended_ = {};
+    intended_.along.unused = "no answer";
+    if (motion_ && outcome.answered) {
+      answered_ = outcome;
+      intends_anew_ = false;
+      followIntended();
+    }
   }
   statement_ = statementOf(outcome, effects_.mapSource(), promises_.broken(), doubts());
   if (!map_slow_.empty()) {
@@ -285,7 +292,7 @@ void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   promises_.forget(why);
   if (motion_) motion_->forget();
   intended_ = {};
-  answered_ns_ = 0;
+  answered_.reset();
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
   map_doubts_.assign(config_.bodies.size(), std::nullopt);
@@ -323,62 +330,6 @@ std::vector<SpeedBound> MonitorPipeline::speedBounds() const {
     if (rigid_[b] && !fixed_frame_.empty() && rigid_[b]->frame == fixed_frame_) bounds[b].max_m_s = 0;
   }
   return bounds;
-}
-
-std::vector<CarriedBody> MonitorPipeline::carriedBodies() const {
-  std::vector<CarriedBody> carried;
-  for (std::size_t b = 0; b < rigid_.size(); ++b) {
-    if (!rigid_[b] || rigid_[b]->isNone() || rigid_[b]->frame == fixed_frame_ || rigid_[b]->let_go_ns != NEVER)
-      continue;
-    CarriedBody& one = carried.emplace_back();
-    one.body = static_cast<std::uint16_t>(b);
-    one.frame = rigid_[b]->frame;
-    one.frame_from_body = rigid_[b]->frame_from_mesh;
-    for (const Vec3& p : rigid_[b]->reference) one.reach_m = std::max(one.reach_m, p.norm());
-  }
-  return carried;
-}
-
-/// Whatever it throws, what the bounds alone allow has been said.
-void MonitorPipeline::followIntended(const Outcome& outcome) try {
-  intended_ = {};
-  intended_.along.unused = "no path is in force";
-  if (!motion_ || !outcome.answered) return;
-  answered_ns_ = outcome.stamp_ns;
-  const auto lookup = [this](const std::string& frame, StampNs stamp_ns) -> std::optional<Eigen::Isometry3d> {
-    Eigen::Isometry3d fixed_from_frame = Eigen::Isometry3d::Identity();
-    std::string reason;
-    if (!transforms_.lookup(fixed_frame_, frame, stamp_ns, fixed_from_frame, reason)) return std::nullopt;
-    return fixed_from_frame;
-  };
-  const std::optional<IntendedPath> path = motion_->from(*outcome.step, carriedBodies(), lookup);
-  if (!path) return;
-  const Options& options = monitor_->options().detector;
-  intended_.path = *path;
-  // What is published waits for it.
-  const Deadline deadline = Deadline::after(tolerance::LOOK_AHEAD_SHARE * timeLimitMs(options));
-  intended_.along = path_search_.run(outcome, options, speedBounds(), config_.speed_law, *path, deadline);
-  if (!intended_.along.rests_on_path) return;
-  // Whether it was, the next answer tells.
-  const auto why_void = [path = beginningAt(*path, *outcome.step), stamp_ns = outcome.stamp_ns](const Outcome& next) {
-    const double ahead_s = secondsBetween(stamp_ns, next.stamp_ns);
-    const PlaceOnPath place = placeOnPath(path, *next.step, 0, ahead_s);
-    if (place.off_m <= path.tubeAt(ahead_s)) return std::string();
-    std::ostringstream text;
-    text << "the robot was " << place.off_m << " m off the intended path, and " << path.tubeAt(ahead_s)
-         << " m are allowed";
-    return text.str();
-  };
-  promises_.extend(outcome, intended_.along.until, why_void);
-} catch (const std::exception& error) {
-  intended_ = {};
-  intended_.along.unused = std::string("a fault of the monitor: ") + error.what();
-}
-
-SpeedScale MonitorPipeline::speedScale(const Outcome& outcome) const {
-  if (!config_.speed_law) return {};
-  if (intended_.along.unused.empty()) return intended_.along.scale;
-  return dccd::speedScale(outcome, speedBounds(), *config_.speed_law);
 }
 
 void MonitorPipeline::doubtMap(const Outcome& outcome) {

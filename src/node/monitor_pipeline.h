@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include <deformable_ccd/WouldTouch.h>
+
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
 #include "dccd/monitor_extras.h"
@@ -144,6 +146,14 @@ class MonitorPipeline {
   /// empty: it holds. Where nobody listens to it nothing happens.
   std::string intend(const trajectory_msgs::JointTrajectory& message) { return intendAny(message); }
   std::string intend(const geometry_msgs::TwistStamped& message) { return intendAny(message); }
+  /// The newest answer, if something else is intended since it was last looked at: what follows is another promise and
+  /// scale now, which are no less than by bounds alone. Null: all stands.
+  const Outcome* reconsider();
+  /// Whether the robot would touch something, if it went along the trajectory from where the newest answer has it.
+  /// `unproved`: why nothing is proved besides; empty: it is. Only with `intent`.
+  deformable_ccd::WouldTouch::Response wouldTouch(const trajectory_msgs::JointTrajectory& trajectory,
+                                                  const std::string& unproved = {});
+  static deformable_ccd::WouldTouch::Response notProved(const std::string& reason);
   /// What follows from it for the last outcome.
   struct Intended {
     IntendedPath path;
@@ -216,8 +226,9 @@ class MonitorPipeline {
   std::optional<IntendedMotion> motion_;
   PathSearch path_search_;
   Intended intended_;
+  std::optional<Outcome> answered_;  // the newest answer, where somebody listens to what is intended
+  bool intends_anew_ = false;        // since then
   std::string voided_;
-  StampNs answered_ns_ = 0;               // of the newest answer
   StampNs call_ns_ = 0, changed_ns_ = 0;  // the latter of the last call that changed something,
   StampNs newest_ns_ = 0;                 // and the clock body's newest stamp then
   std::string changed_;                   // what it did
@@ -301,9 +312,12 @@ class MonitorPipeline {
 
   template <class Message>
   std::string intendAny(const Message& message) {
-    return motion_ ? motion_->take(message, answered_ns_) : std::string();
+    intends_anew_ = motion_.has_value();
+    return motion_ ? motion_->take(message, answered_ ? answered_->stamp_ns : 0) : std::string();
   }
-  void followIntended(const Outcome& outcome);
+  void followIntended();
+  AlongPath searchAlong(const IntendedPath& path, FirstTouch* first = nullptr);
+  IntendedMotion::Lookup places();
   std::vector<CarriedBody> carriedBodies() const;
   void loadFiles();
   /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.

@@ -15,15 +15,21 @@ namespace {
 
 constexpr double SERVICE_TIMEOUT_S = 10;
 
-template <class Service>
-ros::ServiceServer advertise(ros::NodeHandle& node, const char* name,
-                             const std::function<Reply(const typename Service::Request&)>& answer) {
+using WouldTouch = deformable_ccd::WouldTouch;
+
+template <class Response>
+void put(const Reply& reply, Response& response) {
+  response.success = reply.success;
+  response.message = reply.message;
+}
+void put(const WouldTouch::Response& answer, WouldTouch::Response& response) { response = answer; }
+
+template <class Service, class Answer>
+ros::ServiceServer advertise(ros::NodeHandle& node, const char* name, const Answer& answer) {
   using Request = typename Service::Request;
   using Response = typename Service::Response;
   return node.advertiseService<Request, Response>(name, [answer](Request& request, Response& response) {
-    const Reply reply = answer(request);
-    response.success = reply.success;
-    response.message = reply.message;
+    put(answer(request), response);
     return true;
   });
 }
@@ -50,6 +56,17 @@ void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
       return Reply{outcome.answered, describe(outcome)};
     });
   }));
+  const auto would_touch = [this](const WouldTouch::Request& request) {
+    const auto answer = std::make_shared<WouldTouch::Response>();
+    const Reply reply = queue.call(
+        [this, trajectory = request.trajectory, answer] {
+          *answer = pipeline.wouldTouch(trajectory, state.whyNotProved());
+          return Reply{true, ""};
+        },
+        SERVICE_TIMEOUT_S);
+    return reply.success ? *answer : MonitorPipeline::notProved(reply.message);
+  };
+  if (config.intent) services.push_back(advertise<WouldTouch>(service, "would_touch", would_touch));
   services.push_back(advertise<Trigger>(service, "record_step", [this](const Trigger::Request&) {
     return ask([this] {
       Reply reply;

@@ -185,19 +185,8 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   // results are ready by then. But a long list is not to keep a clear state standing that is over.
   std::function<void()> publish;
   if (outcome.contacts.size() <= SHORT_LIST) publish = outputs.makeResult(outcome, bodies, frame);
-  const std::vector<SpeedBound> bounds = pipeline.speedBounds();
   state.tell(outcome, pipeline.statement(), frame, pipeline.speedScale(outcome));
-  if (config.promises()) {
-    deformable_ccd::SafeUntil promise = toSafeUntil(outcome, pipeline.promises(), bounds, ros::Time::now(), frame);
-    if (pipeline.intended().along.rests_on_path)
-      promise.assumed.push_back(assumedOf(outcome, pipeline.intended().path));
-    outputs.publishSafeUntil(promise);
-  }
-  if (config.intent) {
-    outputs.publishAlongPath(toAlongPath(outcome, pipeline.intended().path, pipeline.intended().along, frame));
-    const std::string problem = pipeline.takeIntendedProblem();
-    if (!problem.empty()) log.complain("intended", private_node.resolveName("intended"), problem);
-  }
+  publishAhead(outcome);
   if (!publish) publish = outputs.makeResult(outcome, bodies, frame);
   publish();
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
@@ -224,6 +213,22 @@ void CollisionMonitor::Impl::publishVoided() {
   if (why.empty()) return;
   state.takeBack(why + "; no step has been answered since");
   if (pipeline.promises().isRevoked()) publishNoPromise();  // else none was made that could be taken back
+}
+
+/// Beside the scale: until when nothing touches, and what is intended.
+void CollisionMonitor::Impl::publishAhead(const Outcome& outcome) {
+  const auto& [path, along] = pipeline.intended();
+  const std::string& frame = pipeline.fixedFrame();
+  if (config.promises()) {
+    deformable_ccd::SafeUntil promise =
+        toSafeUntil(outcome, pipeline.promises(), pipeline.speedBounds(), ros::Time::now(), frame);
+    if (along.rests_on_path) promise.assumed.push_back(assumedOf(outcome, path));
+    outputs.publishSafeUntil(promise);
+  }
+  if (!config.intent) return;
+  outputs.publishAlongPath(toAlongPath(outcome, path, along, frame));
+  const std::string problem = pipeline.takeIntendedProblem();
+  if (!problem.empty()) complainOfIntended(problem);
 }
 
 void CollisionMonitor::Impl::publishNoPromise() {
@@ -302,6 +307,10 @@ void CollisionMonitor::Impl::work() {
 bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
   for (const auto& command : commands) carryOut(command);
   if (!commands.empty()) publishVoided();
+  if (const Outcome* const outcome = pipeline.reconsider()) {
+    state.tellSpeed(*outcome, pipeline.speedScale(*outcome));
+    publishAhead(*outcome);
+  }
   if (map_publisher_seen) pipeline.expectMap();
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
   pipeline.effects().hearDistances(outputs.wantsDistances());

@@ -117,6 +117,18 @@ void StateReporter::tell(const Outcome& outcome, const Statement& statement, con
   say(true);
 }
 
+void StateReporter::tellSpeed(const Outcome& outcome, const SpeedScale& speed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!law_) return;
+  speed_told_ = toSpeedScale(outcome, speed, told_.header.frame_id);
+  say(true);
+}
+
+std::string StateReporter::whyNotProved() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return unproved_;
+}
+
 void StateReporter::asked(const std::string& what) {
   const std::lock_guard<std::mutex> lock(mutex_);
   liveness_.ask(what);
@@ -182,6 +194,7 @@ void StateReporter::say(bool always) {
   if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
   Statement statement = answer_;
   statement.assurance.hinder(sentences);
+  unproved_ = statement.assurance.proved ? "" : statement.assurance.missing.front();
   if (!statement.is_doubts_fault) statement.hint = joined(statement.hint, hint_);
   // What is published as an object wakes roscpp's thread only where somebody listens: that thread takes locks, and
   // perhaps the core, from the worker, which has yet to publish the contacts.

@@ -61,6 +61,10 @@ class StateReporter {
   void staticInUse(const std::string& body, std::uint64_t number);
   /// A step's answer, or why there is none, and what it allows.
   void tell(const Outcome& outcome, const Statement& statement, const std::string& frame, const SpeedScale& speed);
+  /// Of the step that was told last: what it allows now.
+  void tellSpeed(const Outcome& outcome, const SpeedScale& speed);
+  /// Why ~state says that nothing is proved; empty: it says that it is.
+  std::string whyNotProved();
   /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
   void setHint(const std::string& hint);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.
@@ -94,7 +98,7 @@ class StateReporter {
   double stamp_age_s_ = 0;                 // of its frame, when it was told
   std::int64_t told_ns_ = 0;               // when that was, on the watch's clock
   bool slowed_ = false;                    // by its age, as it was said last
-  std::string hint_;
+  std::string hint_, unproved_;
   std::vector<Fault::Kind> hinders_;  // what was said to stand in its way
   bool stopped_ = false;
   std::thread thread_;

@@ -37,6 +37,8 @@ bool asksItself(const Outcome& outcome) {
                      [](const Clearance& row) { return row.body[0] == row.body[1]; });
 }
 
+}  // namespace
+
 std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<SpeedBound>& bounds) {
   std::vector<std::string> sentences;
   if (!outcome.answered) return sentences;
@@ -57,8 +59,6 @@ std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<S
   }
   return sentences;
 }
-
-}  // namespace
 
 deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch& watch,
                                       const std::vector<SpeedBound>& bounds, const ros::Time& now,

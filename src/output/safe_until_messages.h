@@ -24,7 +24,8 @@ deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const SpeedScale
 /// What a path says of a step.
 deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath& path, const AlongPath& along,
                                       const std::string& frame);
-/// That a promise rests on the path, a sentence.
+/// What a promise rests on, a sentence each; that it rests on a path, too.
+std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<SpeedBound>& bounds);
 std::string assumedOf(const Outcome& outcome, const IntendedPath& path);
 /// Why the newest answer is too old for the law, which counts from its frame's stamp, but at least from its arrival; so
 /// long ago were the two [s]. Empty: it is not.

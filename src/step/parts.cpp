@@ -14,11 +14,6 @@ namespace {
 
 constexpr double MOST_PARTS_FOR_WAYPOINTS = 64;
 
-double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
-  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
-}
-
 /// Two neighbours of the step's ends and the waypoints, and how far between them.
 struct Leg {
   const Eigen::Isometry3d *from_pose, *to_pose;
@@ -73,19 +68,15 @@ double sagitta(double radius, double angle) {
   return radius * 2 * half * half;
 }
 
-/// The corners of what the body spans at its start: of all that is affine in its vertices, the largest is at one.
+/// Of what the body spans at its start.
 std::array<Vec3, 8> cornersOf(const Body& body) {
   Eigen::AlignedBox3d bounds(Vec3::Zero());
   bounds.setEmpty();
   for (const Vec3& p : *body.t0) {
     if (p.allFinite()) bounds.extend(p);
   }
-  std::array<Vec3, 8> corners;
-  corners.fill(body.pose_t0.translation());
-  for (int i = 0; i < 8 && !bounds.isEmpty(); ++i) {
-    corners[static_cast<std::size_t>(i)] = bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
-  }
-  return corners;
+  if (bounds.isEmpty()) bounds.extend(body.pose_t0.translation());
+  return dccd::cornersOf(bounds);
 }
 
 /// How far the body is at its waypoints from straight paths through so many equal parts [m]. Vertices that are not
@@ -158,6 +149,19 @@ Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margi
 }
 
 }  // namespace
+
+double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
+  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+}
+
+std::array<Vec3, 8> cornersOf(const Eigen::AlignedBox3d& box) {
+  std::array<Vec3, 8> corners;
+  corners.fill(Vec3::Zero());
+  for (int i = 0; i < 8 && !box.isEmpty(); ++i)
+    corners[static_cast<std::size_t>(i)] = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+  return corners;
+}
 
 double partsFor(const Body& body, double pose_scale, double tolerance_m, const Extent* extent) {
   const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1);

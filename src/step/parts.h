@@ -12,6 +12,12 @@
 
 namespace dccd {
 
+/// How far the second pose is turned from the first one [rad], 0 to pi.
+double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
+
+/// Of all that is affine in what the box holds, the largest is at one of these. All 0 of an empty one.
+std::array<Vec3, 8> cornersOf(const Eigen::AlignedBox3d& box);
+
 /// The parts that a step must be cut into so that the turning body's straight vertex paths stay within the tolerance of
 /// its arc [m]; not limited. extent: what spares a look at each vertex, if it is of t0; null: none.
 double partsFor(const Body& body, double pose_scale, double tolerance_m, const Extent* extent = nullptr);

@@ -6,34 +6,12 @@
 
 #include "dccd/intended.h"
 #include "dccd/mesh_store.h"
-#include "stream/path_distances.h"
+#include "step/parts.h"
 
 namespace dccd {
 namespace {
 
 bool isLength(double value) { return value >= 0 && std::isfinite(value); }
-
-/// The piece that holds the time, the last one at the end.
-std::size_t pieceAt(const IntendedPath& path, double time_s) {
-  const auto after = std::upper_bound(path.time_s.begin() + 1, path.time_s.end() - 1, time_s);
-  return static_cast<std::size_t>(after - path.time_s.begin()) - 1;
-}
-
-/// Corners of the box around a body at the step's end: a vertex is off a place by no more than one of them is.
-struct BoxCorners {
-  std::vector<Vec3> local, now;
-};
-
-BoxCorners boxCornersOf(const Body& body) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : *body.t1) box.extend(p);
-  BoxCorners corners;
-  for (int i = 0; i < 8; ++i) {
-    corners.now.push_back(box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
-    corners.local.push_back(body.pose_t1.inverse() * corners.now.back());
-  }
-  return corners;
-}
 
 bool isAllFinite(const Body& body) {
   return !body.t1->empty() && body.pose_t1.matrix().allFinite() &&
@@ -42,13 +20,18 @@ bool isAllFinite(const Body& body) {
 
 }  // namespace
 
-double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
-  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+const IntendedPath::Of* IntendedPath::find(std::uint16_t body) const {
+  const auto found = std::find_if(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });
+  return found == bodies.end() ? nullptr : &*found;
 }
 
-bool IntendedPath::has(std::uint16_t body) const {
-  return std::any_of(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });
+std::size_t IntendedPath::pieceAt(double at_s) const {
+  const auto after = std::upper_bound(time_s.begin() + 1, time_s.end() - 1, at_s);
+  return static_cast<std::size_t>(after - time_s.begin()) - 1;
+}
+
+double IntendedPath::shareAt(std::size_t piece, double at_s) const {
+  return std::clamp((at_s - time_s[piece]) / (time_s[piece + 1] - time_s[piece]), 0.0, 1.0);
 }
 
 std::string problemOf(const IntendedPath& path, const std::vector<Body>& bodies) {
@@ -98,7 +81,7 @@ void addPieces(const PosesAt& poses, double until_s, double acceleration_m_s2, d
     const std::vector<Eigen::Isometry3d> next = poses(time_s);
     double angle = 0;
     for (std::size_t i = 0; i < path.bodies.size(); ++i) {
-      angle = std::max(angle, angleBetween(path.bodies[i].pose.back(), next.at(i)));
+      angle = std::max(angle, rotationAngle(path.bodies[i].pose.back(), next.at(i)));
       path.bodies[i].pose.push_back(next[i]);
     }
     path.time_s.push_back(time_s);
@@ -126,33 +109,40 @@ PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_
   constexpr double ROUNDING = 1 + 1e-9;
   to_s = std::clamp(to_s, 0.0, path.endsAt());
   from_s = std::clamp(from_s, 0.0, to_s);
-  std::vector<BoxCorners> corners;
-  for (const IntendedPath::Of& of : path.bodies) corners.push_back(boxCornersOf(step.bodies[of.body]));
+  // Of the boxes around the bodies: a vertex is off a place by no more than one of these is.
+  std::vector<std::array<Vec3, 8>> now, local;
+  for (const IntendedPath::Of& of : path.bodies) {
+    const Body& body = step.bodies[of.body];
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : *body.t1) box.extend(p);
+    now.push_back(cornersOf(box));
+    for (Vec3& p : local.emplace_back(now.back())) p = body.pose_t1.inverse() * p;
+  }
   bool is_found = false, is_left = false;  // a stretch that is near enough
-  for (std::size_t k = pieceAt(path, from_s); k + 1 < path.time_s.size(); ++k) {
+  for (std::size_t k = path.pieceAt(from_s); k + 1 < path.time_s.size(); ++k) {
     const double begins_s = path.time_s[k], lasts_s = path.time_s[k + 1] - begins_s;
     if (begins_s > to_s) break;
     const double least = std::max(0.0, (from_s - begins_s) / lasts_s),
                  most = std::min(1.0, (to_s - begins_s) / lasts_s);
     double near_from = least, near_to = most;
     double along = 0, way_sq = 0;  // of the least sum of squares on the chords
-    for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (std::size_t i = 0; i < now.size(); ++i) {
       const std::vector<Eigen::Isometry3d>& pose = path.bodies[i].pose;
-      for (std::size_t c = 0; c < corners[i].now.size(); ++c) {
-        const Vec3 from = pose[k] * corners[i].local[c], way = pose[k + 1] * corners[i].local[c] - from;
-        along += way.dot(corners[i].now[c] - from);
+      for (std::size_t c = 0; c < now[i].size(); ++c) {
+        const Vec3 from = pose[k] * local[i][c], way = pose[k + 1] * local[i][c] - from;
+        along += way.dot(now[i][c] - from);
         way_sq += way.squaredNorm();
-        limitToBall(from, way, corners[i].now[c], (within_m + path.bend_m[k]) * ROUNDING, near_from, near_to);
+        limitToBall(from, way, now[i][c], (within_m + path.bend_m[k]) * ROUNDING, near_from, near_to);
       }
     }
     const bool is_near = near_from <= near_to;
     const double u =
         std::clamp(way_sq > 0 ? along / way_sq : most, is_near ? near_from : least, is_near ? near_to : most);
     double off_sq = 0;
-    for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (std::size_t i = 0; i < now.size(); ++i) {
       const Eigen::Isometry3d pose = interpolate(path.bodies[i].pose[k], path.bodies[i].pose[k + 1], u);
-      for (std::size_t c = 0; c < corners[i].now.size(); ++c)
-        off_sq = std::max(off_sq, (pose * corners[i].local[c] - corners[i].now[c]).squaredNorm());
+      for (std::size_t c = 0; c < now[i].size(); ++c)
+        off_sq = std::max(off_sq, (pose * local[i][c] - now[i][c]).squaredNorm());
     }
     const double off_m = std::sqrt(off_sq) + path.bend_m[k];
     is_left = is_left || (is_found && (!is_near || near_from > least));
@@ -170,10 +160,10 @@ PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_
 
 IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double lasts_s) {
   constexpr double NO_TIME_S = 1e-9;  // of a piece
-  IntendedPath rest;
-  rest.deviation_m = path.deviation_m;
-  rest.deviation_rate_m_s = path.deviation_rate_m_s;
-  for (const IntendedPath::Of& of : path.bodies) rest.bodies.push_back({of.body, {}});
+  IntendedPath rest = path;
+  rest.time_s.clear();
+  rest.bend_m.clear();
+  for (IntendedPath::Of& of : rest.bodies) of.pose.clear();
   from_s = std::max(0.0, from_s);
   by_s = std::max(from_s, by_s);
   const double until_s = std::min(path.endsAt(), by_s + lasts_s);
@@ -185,8 +175,8 @@ IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double
   std::sort(cuts.begin(), cuts.end());
   cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
   for (const double time_s : cuts) {
-    const std::size_t piece = pieceAt(path, time_s);
-    const double share = (time_s - path.time_s[piece]) / (path.time_s[piece + 1] - path.time_s[piece]);
+    const std::size_t piece = path.pieceAt(time_s);
+    const double share = path.shareAt(piece, time_s);
     const double after_s = rest.time_s.empty() ? 0 : rest.time_s.back() + NO_TIME_S;
     rest.time_s.push_back(std::max(after_s, time_s - by_s));
     if (time_s < until_s) rest.bend_m.push_back(path.bend_m[piece]);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dccd/monitor_extras.h"
@@ -15,6 +16,18 @@ namespace dccd {
 
 inline double roundedDown(double value) { return std::nextafter(value, 0.0); }  // of what is 0 or more
 inline double roundedUp(double value) { return std::nextafter(value, SpeedBound::NONE); }
+
+/// Between a value of which `holds` holds and one of which it does not: two that are next to each other, or what is
+/// left of these after so many halvings. Where it holds of a value it does of all that are less.
+template <class Holds>
+std::pair<double, double> halved(double low, double high, const Holds& holds, int times = 5000) {
+  for (; times > 0; --times) {
+    const double middle = low + (high - low) / 2;
+    if (middle <= low || middle >= high) break;
+    (holds(middle) ? low : high) = middle;
+  }
+  return {low, high};
+}
 
 std::string nameOf(const Outcome& outcome, std::size_t body);
 std::string pairOf(const Outcome& outcome, const Clearance& pair);

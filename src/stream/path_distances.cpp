@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dccd/mesh_store.h"
+#include "step/parts.h"
 #include "stream/radii.h"
 
 namespace dccd {
@@ -27,24 +28,14 @@ void PathDistances::begin(const Outcome& outcome, const IntendedPath& path, cons
   if (outcome.obstacle) map_.set(outcome.obstacle);
 }
 
-std::size_t PathDistances::pieceAt(double time_s) const {
-  const std::vector<double>& times = path_->time_s;
-  return static_cast<std::size_t>(std::upper_bound(times.begin() + 1, times.end() - 1, time_s) - times.begin()) - 1;
-}
-
 std::size_t PathDistances::lastPieceOf(const Stretch& stretch) const {
-  std::size_t last = pieceAt(stretch.from_s);
+  std::size_t last = path_->pieceAt(stretch.from_s);
   while (path_->time_s[last + 1] < stretch.to_s) ++last;
   return last;
 }
 
-double PathDistances::shareAt(std::size_t piece, double time_s) const {
-  const double begins_s = path_->time_s[piece], ends_s = path_->time_s[piece + 1];
-  return std::clamp((time_s - begins_s) / (ends_s - begins_s), 0.0, 1.0);
-}
-
 double PathDistances::cutOf(const Stretch& stretch) const {
-  const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
+  const std::size_t first = path_->pieceAt(stretch.from_s), last = lastPieceOf(stretch);
   return last > first ? path_->time_s[first + (last - first + 1) / 2]
                       : stretch.from_s + (stretch.to_s - stretch.from_s) / 2;
 }
@@ -66,9 +57,8 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
     one.still = one.moving;
   }
   one.is_known = true;
-  one.pose = nullptr;
-  for (const IntendedPath::Of& of : path_->bodies)
-    if (of.body == number) one.pose = &of.pose;
+  const IntendedPath::Of* const of = path_->find(number);
+  one.pose = of ? &of->pose : nullptr;
   const Eigen::Isometry3d to_local = one.pose ? body.pose_t1.inverse() : Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3d box(Vec3::Zero());
   box.setEmpty();
@@ -83,8 +73,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
     if (is_asked) box.extend(p);
     one.reach_m = std::max(one.reach_m, p.norm());
   }
-  for (std::size_t i = 0; i < one.corners.size(); ++i)
-    one.corners[i] = box.isEmpty() ? Vec3(Vec3::Zero()) : box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+  one.corners = cornersOf(box);
   for (std::size_t k = 0; one.pose && k < one.pose->size(); ++k)
     one.out_m = std::max(one.out_m, largestOf((*one.pose)[k].translation()));
   one.radius_m = largestRadius(body);
@@ -93,7 +82,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
 }
 
 Eigen::Isometry3d PathDistances::poseAt(const Way& way, std::size_t piece, double time_s) const {
-  const double share = shareAt(piece, time_s);
+  const double share = path_->shareAt(piece, time_s);
   const auto at = [&](const Shape& shape) {
     return interpolate((*shape.pose)[piece], (*shape.pose)[piece + 1], share);
   };
@@ -127,10 +116,10 @@ PathDistances::Way PathDistances::wayOf(const std::array<std::uint16_t, 2>& body
     way.pose.push_back(poseAt(way, k, path_->time_s[k + 1]));
     const auto from = [&](const Shape& shape) -> const Eigen::Isometry3d& { return (*shape.pose)[k]; };
     const auto to = [&](const Shape& shape) -> const Eigen::Isometry3d& { return (*shape.pose)[k + 1]; };
-    const double turn = angleBetween(from(mover), to(mover));
+    const double turn = rotationAngle(from(mover), to(mover));
     double bends = turn * turn * mover.reach_m;
     if (both) {
-      const double frame = angleBetween(from(*still), to(*still));
+      const double frame = rotationAngle(from(*still), to(*still));
       const Vec3 begin = from(mover).translation() - from(*still).translation(),
                  end = to(mover).translation() - to(*still).translation();
       bends += 2 * frame * ((end - begin).norm() + turn * mover.reach_m) +
@@ -148,15 +137,15 @@ PathDistances::Way PathDistances::wayOf(const std::array<std::uint16_t, 2>& body
 double PathDistances::bendOf(const Way& way, const Stretch& stretch) const {
   if (!(stretch.from_s < stretch.to_s)) return 0;
   double most_m = 0;
-  for (std::size_t k = pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k)
+  for (std::size_t k = path_->pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k)
     most_m = std::max(most_m, path_->bend_m[k]);
   return way.bends * most_m;
 }
 
 double PathDistances::arcOf(const Way& way, const Stretch& stretch) const {
   double most_m = 0;
-  for (std::size_t k = pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k) {
-    const double share = shareAt(k, stretch.to_s) - shareAt(k, stretch.from_s);
+  for (std::size_t k = path_->pieceAt(stretch.from_s), last = lastPieceOf(stretch); k <= last; ++k) {
+    const double share = path_->shareAt(k, stretch.to_s) - path_->shareAt(k, stretch.from_s);
     most_m = std::max(most_m, way.arc_m[k] * share * share);
   }
   return most_m * ABOVE + way.rounding_m;
@@ -164,7 +153,7 @@ double PathDistances::arcOf(const Way& way, const Stretch& stretch) const {
 
 /// Where a piece is gone in part only, the mover is off its chord.
 double PathDistances::goneBy(const Way& way, const Stretch& stretch) const {
-  const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
+  const std::size_t first = path_->pieceAt(stretch.from_s), last = lastPieceOf(stretch);
   double arc_m = 0;
   for (std::size_t k = first; k <= last; ++k) arc_m = std::max(arc_m, way.arc_m[k]);
   const double parts = stretch.from_s > path_->time_s[first] ? 2 : 1;
@@ -176,7 +165,7 @@ double PathDistances::goneBy(const Way& way, const Stretch& stretch) const {
 /// Returns by how much [m].
 double PathDistances::place(const Way& way, const Stretch& stretch) {
   Shape& mover = shapes_[way.mover];
-  const std::size_t first = pieceAt(stretch.from_s), last = lastPieceOf(stretch);
+  const std::size_t first = path_->pieceAt(stretch.from_s), last = lastPieceOf(stretch);
   const Eigen::Isometry3d from = poseAt(way, first, stretch.from_s), to = poseAt(way, last, stretch.to_s);
   double off_m = 0;
   for (std::size_t k = first + 1; k <= last; ++k) {
@@ -195,6 +184,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
 
 double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {
   const bool with_map = way.still == OBSTACLE_BODY;
+  found_ = {};
   if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;
   const FeatureTree& tree = shapes_[way.mover].moving;
   const bool known = with_map ? outcome_->obstacle != nullptr : !shapes_[way.still].still.empty();
@@ -205,10 +195,20 @@ double PathDistances::over(const Way& way, const Stretch& stretch, double enough
   const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_, nullptr};
   const auto never = [](std::uint32_t, std::uint32_t) { return true; };  // is asked of what is at the end alone
   const NearestSearch::AllPairs all;
-  const FoundDistance found = with_map ? search_.run(tree, map_, all, goal, {}, never)
-                                       : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
-  const double rest_m = found.lower_m - taken_m - (ABOVE - 1) * found.lower_m;
+  found_ = with_map ? search_.run(tree, map_, all, goal, {}, never)
+                    : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
+  const double rest_m = found_.lower_m - taken_m - (ABOVE - 1) * found_.lower_m;
   return rest_m > 0 ? rest_m : 0;
+}
+
+Vec3 PathDistances::nearest(const Way& way, double time_s) {
+  over(way, {time_s, time_s}, LARGEST_M, 1e-6);
+  if (!std::isfinite(found_.upper_m)) return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Vec3 between = (found_.point[0] + found_.point[1]) / 2;
+  if (way.still == OBSTACLE_BODY) return outcome_->step->map.map_from_fixed.inverse() * between;
+  const std::vector<Eigen::Isometry3d>* const pose = shapes_[way.still].pose;
+  const std::size_t piece = path_->pieceAt(time_s);
+  return pose ? interpolate((*pose)[piece], (*pose)[piece + 1], path_->shareAt(piece, time_s)) * between : between;
 }
 
 }  // namespace dccd

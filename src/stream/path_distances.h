@@ -14,9 +14,6 @@
 
 namespace dccd {
 
-/// How far the second pose is turned from the first one [rad], 0 to pi.
-double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
-
 class DCCD_HIDDEN PathDistances {
  public:
   /// From one time of the path to a later one, or the same [s].
@@ -42,6 +39,8 @@ class DCCD_HIDDEN PathDistances {
   /// leave the straight ways through it [m]. Within the tolerance, but for these, of what is true where that is below
   /// enough_m. 0: nobody knows.
   double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m);
+  /// Where the two are nearest at a time, between them, in the fixed frame; NaN: nobody knows.
+  Vec3 nearest(const Way& way, double time_s);
   /// How far any vertex of the mover comes from where it is when the stretch begins, at most [m].
   double goneBy(const Way& way, const Stretch& stretch) const;
   /// What over() takes off for turns within the pieces of the stretch [m].
@@ -51,7 +50,7 @@ class DCCD_HIDDEN PathDistances {
   /// Where to halve the stretch: at an end of a piece, or within the one that it is in.
   double cutOf(const Stretch& stretch) const;
   /// When the piece that holds the time, or begins at it, ends.
-  double pieceEnd(double time_s) const { return path_->time_s[pieceAt(time_s) + 1]; }
+  double pieceEnd(double time_s) const { return path_->time_s[path_->pieceAt(time_s) + 1]; }
 
   std::size_t questions() const { return questions_; }
 
@@ -69,9 +68,7 @@ class DCCD_HIDDEN PathDistances {
     std::vector<VertexMotion> motion, rest;  // by slots
   };
 
-  std::size_t pieceAt(double time_s) const;
   std::size_t lastPieceOf(const Stretch& stretch) const;
-  double shareAt(std::size_t piece, double time_s) const;
   Eigen::Isometry3d poseAt(const Way& way, std::size_t piece, double time_s) const;
   Shape& known(std::uint16_t body);
   double place(const Way& way, const Stretch& stretch);
@@ -82,6 +79,7 @@ class DCCD_HIDDEN PathDistances {
   std::vector<Shape> shapes_;
   MapBoxes map_;
   NearestSearch search_;
+  FoundDistance found_;  // by the last question
   std::size_t questions_ = 0;
 };
 

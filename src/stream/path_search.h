@@ -32,6 +32,8 @@ struct PathPair {
   double allowed_s = 0;    ///< the time of the path that the scale takes which bounds alone allow
   bool may_scale = false;  ///< what is on the path slows down, and the other one has a bound
   bool may_stand = false;  ///< the standing rule is for it
+  bool touches = false;    ///< when the path begins
+  bool is_cut = false;     ///< the time that holds for it could be later: the search was at its end
   double leaves_s = 0;     ///< up to then it leaves what it touches
   PathDistances::Way way;
   struct Asked {
@@ -49,36 +51,9 @@ struct PathPair {
   double scaleNeeds(double scale, const PathPace& pace) const;
 };
 
-/// Whether a body on the path moves away from what it touches, by planes (dccd/intended.h, the standing rule).
-class LeavingPlanes {
- public:
-  /// `ends`: the vertices of the one that moves at the ends of the path's pieces; `leaves_m`: how far each piece leaves
-  /// the straight way between them.
-  LeavingPlanes(const Outcome& outcome, const PathPair& pair, std::uint16_t mover, std::vector<Positions> ends,
-                std::vector<double> leaves_m, std::vector<double> time_s, const PathPace& pace);
-  /// Up to which time of the path; 0: nothing shows it.
-  double until() const;
-
- private:
-  struct Feature {
-    Eigen::AlignedBox3d box;
-    Positions corners;  // none: all of the box's
-  };
-  std::vector<Vec3> directions() const;
-  double untilBy(const Vec3& direction) const;
-
-  const Outcome& outcome_;
-  const PathPair& pair_;
-  std::vector<Positions> ends_;
-  std::vector<double> leaves_m_;
-  std::vector<double> time_s_;
-  std::vector<double> needed_m_;  // at each of these
-  std::uint16_t mover_, partner_;
-  Eigen::Isometry3d to_map_ = Eigen::Isometry3d::Identity();  // the frame in which all of this is
-  std::vector<Eigen::AlignedBox3d> pieces_;                   // around the body, wider by what the piece leaves its way
-  std::vector<Feature> features_;                             // of the partner, that are not far from all pieces
-  double radius_m_ = 0, rounding_m_ = 0;
-  bool may_hold_ = false;  // one of the two may be inside of the other
-};
+/// Up to which time of the path, most_s at the most, the one of the two that is on it moves away from what it touches,
+/// by planes (dccd/intended.h, the standing rule); 0: nothing shows it.
+double leavesUntil(const Outcome& outcome, const PathPair& pair, const IntendedPath& path, double most_s,
+                   const PathPace& pace);
 
 }  // namespace dccd

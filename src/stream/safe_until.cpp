@@ -157,6 +157,8 @@ void PromiseWatch::keep(const Outcome& outcome) {
 
 void PromiseWatch::extend(const Outcome& outcome, const SafeUntil& later,
                           std::function<std::string(const Outcome&)> why_void) {
+  const bool is_less = later.until_ns < promise_.until_ns || later.others_until_ns < promise_.others_until_ns;
+  if (why_void_ && (is_less || !promise_.isPromise())) broken_ = "something else is intended now";
   promise_ = later;
   why_void_ = std::move(why_void);
   if (!step_ && promise_.isPromise()) keep(outcome);
@@ -192,12 +194,8 @@ double speedScale(double distance_m, double v_r_m_s, double v_h_m_s, const Speed
   if (!(separationDistance(0, v_r_m_s, v_h_m_s, law) <= distance_m) || !std::isfinite(distance_m)) return 0;
   if (separationDistance(1, v_r_m_s, v_h_m_s, law) <= distance_m) return 1;
   // S_p grows with the scale. Halving finds the largest double that is short of the distance as it is rounded.
-  double low = 0, high = 1;
-  for (;;) {
-    const double middle = low + (high - low) / 2;
-    if (middle <= low || middle >= high) return low;
-    (separationDistance(middle, v_r_m_s, v_h_m_s, law) <= distance_m ? low : high) = middle;
-  }
+  const auto is_short = [&](double scale) { return separationDistance(scale, v_r_m_s, v_h_m_s, law) <= distance_m; };
+  return halved(0, 1, is_short).first;
 }
 
 SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& given, const SpeedLaw& law) {

@@ -243,6 +243,18 @@ class CellTest(FolderTestCase):
                 message.others_until += genpy.Duration(0, 100000)
         self.refuted('safe_until', longer, 'safe_until', 'are promised at')
 
+    def test_along_a_path(self):
+        """Its law is another one: what may be said by it is not held against the bounds alone."""
+        self.cell('along', 'intent: {horizon_s: 1.0, deviation_m: 0.01}\n')
+
+        def longer(message):
+            if message.seconds > 0:
+                message.until += genpy.Duration(1)
+                message.others_until += genpy.Duration(1)
+                message.assumed.append("'finger' go along the intended path, at no more than its pace, within 0.01 m and 0 m/s")
+        self.not_covered('a promise along an intended path', 'safe_until', longer)
+        self.not_covered('a scale that may be along an intended path', 'speed_scale', lambda m: m.scale > 0 and setattr(m, 'scale', 1))
+
     def test_scale(self):
         self.cell('scale')
         self.holds()

@@ -2,6 +2,7 @@
 #include <deformable_ccd/AlongPath.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
+#include <deformable_ccd/WouldTouch.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Log.h>
@@ -35,9 +36,10 @@ struct Intended : ::testing::Test {
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
   ros::Publisher tip = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tip");
   std::atomic<double> plate_m{0.1};
-  std::atomic<bool> ends{false};
+  std::atomic<bool> ends{false}, pauses{false};
   std::thread frames{[this] {
     for (; !ends; ros::WallDuration(0.05).sleep()) {
+      if (pauses) continue;
       const deformable_ccd::MeshStamped mesh = meshStamped(tipAbove(0.3), ros::Time::now().toSec());
       tf2_msgs::TFMessage message;
       auto& one = message.transforms.emplace_back();
@@ -116,6 +118,29 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
     expectBoundsAlone("after a mistake");
   }
 
+  // Two mistakes of one kind make one line, another kind has its own; and no frame is waited for.
+  const auto count = [&](const std::string& text) {
+    const auto all = lines.all();
+    return std::count_if(all.begin(), all.end(), [&](const rosgraph_msgs::Log& line) {
+      return line.msg.find(name + "/intended: " + text) != std::string::npos;
+    });
+  };
+  EXPECT_EQ(count("joint_names[0] 'elbow'"), 1);
+  EXPECT_EQ(count("points[1]/positions[0] is nan"), 1) << "within five seconds of the first one";
+  EXPECT_EQ(count("header/stamp is late"), 1);
+  intended.publish(holds());
+  expectThePath("before frames stay away");
+  pauses = true;
+  ros::WallDuration(0.2).sleep();
+  const ros::Time stamp = promises.last().header.stamp;
+  wrong = holds();
+  wrong.joint_names = {"elbow"};
+  intended.publish(wrong);
+  expectBoundsAlone("without a frame");
+  EXPECT_EQ(promises.last().header.stamp, stamp);
+  EXPECT_EQ(promises.last().broken, "something else is intended now");
+  pauses = false;
+
   intended.publish(holds());
   expectThePath("before the plate is elsewhere");
   plate_m = 0.15;
@@ -127,6 +152,33 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
     });
   }));
   EXPECT_TRUE(waitUntil([&] { return std::abs(promises.last().seconds - 0.149 / 0.6) < 1e-3; }));
+}
+
+TEST_F(Intended, APlannerAsksBeforeItSends) {
+  using deformable_ccd::WouldTouch;
+  expectBoundsAlone("at first");
+  const auto ask = [&](double height_m) {
+    WouldTouch call;
+    call.request.trajectory = holds();
+    call.request.trajectory.points[1].positions = {height_m};
+    call.request.trajectory.points[1].time_from_start = ros::Duration(2);
+    EXPECT_TRUE(ros::service::call(name + "/would_touch", call));
+    return call.response;
+  };
+  // The mesh below, at 0.1 m/s, and the tube, which grows by 0.01 m/s, come towards what comes down at 0.1 m/s, or
+  // rests.
+  const WouldTouch::Response down = ask(-0.1), rests = ask(0.1);
+  EXPECT_EQ(down.verdict, WouldTouch::Response::TOUCHES) << down.reason;
+  EXPECT_NEAR(down.first, (0.099 - 0.01) / 0.21, 0.03 * 0.42);
+  EXPECT_NEAR(down.point.z, (0.099 - 0.042) / 2, 0.002);
+  EXPECT_EQ(rests.verdict, WouldTouch::Response::TOUCHES) << rests.reason;
+  EXPECT_NEAR(rests.first, (0.099 - 0.01) / 0.11, 0.03 * 0.81);
+  EXPECT_FALSE(paths.last().used);
+  pauses = true;
+  EXPECT_TRUE(waitUntil([&] { return scales.last().reason.find("not proved") != std::string::npos; }));
+  const WouldTouch::Response late = ask(0.05);
+  EXPECT_EQ(late.verdict, WouldTouch::Response::NOT_PROVED);
+  EXPECT_NE(late.reason, "");
 }
 
 }  // namespace

@@ -129,6 +129,25 @@ TEST(IntendedPath, TheScaleLetsItStandBeforeItTouches) {
   EXPECT_EQ(along.scale.limiting, 0u);
 }
 
+TEST(IntendedPath, WhatWasPassedNearbyMayStillCome) {
+  // Up to 0.1 m of a cloth in half a second, and away from it: at 0.1 m/s that is where the tool is within a second.
+  Scene scene(0.1);
+  scene.step.map.surface = nullptr;
+  scene.step.bodies.push_back(boxBody("cloth", {0.3, -0.05, 0.1}, {0.4, 0.05, 0.2}));
+  scene.bounds = {{1}, {0.1}};
+  scene.goes({0.15, 0, 0}, 0.5);
+  addPieces(
+      [](double t) {
+        Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+        pose.translation().x() = 0.15 - 0.6 * (t - 0.5);
+        return std::vector<Eigen::Isometry3d>{pose};
+      },
+      2, 0, 0, 1e-3, 64, scene.path);
+  const AlongPath along = scene.run();
+  EXPECT_LE(along.until.seconds(), 1);
+  EXPECT_GE(along.until.seconds(), 0.97);
+}
+
 TEST(IntendedPath, WhatTouchesAtItsSurfaceMayLeave) {
   for (const Vec3& way : {Vec3(0, 0, 0.3), Vec3(0.2, 0, 0.2), Vec3(0.3, 0, 0)}) {
     const AlongPath along = Scene(0).goes(way, 1).tube(0.002, 0.01).run();

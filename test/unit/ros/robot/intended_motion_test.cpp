@@ -17,10 +17,10 @@ using geometry_msgs::TwistStamped;
 using trajectory_msgs::JointTrajectory;
 
 /// A lift that slides along z, a plate on it, and a hand that turns and that a finger follows.
-std::string liftUrdf() {
+std::string liftUrdf(const std::string& hand = "") {
   const std::string z = "<axis xyz='0 0 1'/>", limit = "<limit lower='-2' upper='2' effort='1' velocity='1'/>";
   return robotOf(
-      link("base", "") + link("plate", collision("<box size='1 1 0.002'/>")) + link("hand", "") + link("finger", "") +
+      link("base", "") + link("plate", collision("<box size='1 1 0.002'/>")) + link("hand", hand) + link("finger", "") +
       link("tray", "") + joint("base", "plate", "prismatic", z + limit) + joint("plate", "tray") +
       joint("plate", "hand", "revolute", "<origin xyz='0.3 0 0.1'/>" + z + limit) +
       joint("hand", "finger", "revolute",
@@ -111,18 +111,19 @@ TwistStamped twist(double begin_s, const std::string& frame, double z, double tu
 
 /// A cloth that is held over the plate, and a monitor that listens.
 struct Lift {
-  explicit Lift(double deviation_m = 0.01)
-      : driven(
-            robotScene("max_speed_m_s: 1",
-                       "effects: {octomap: 'off'}, intent: {horizon_s: 1, deviation_m: " + std::to_string(deviation_m) +
-                           ", deviation_rate_m_s: 0.01}, speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}, "
-                           "bodies: {cloth: {topic: cloth, topology: {rows: 2, cols: 2}, max_speed_m_s: 0.1}}"),
-            loads(liftUrdf())) {
+  explicit Lift(double deviation_m = 0.01, bool with_table = false, const std::string& hand = "")
+      : driven(robotScene(with_table ? "max_speed_m_s: 1, against_map: true, own_voxels_m: 0" : "max_speed_m_s: 1",
+                          std::string(with_table ? "" : "effects: {octomap: 'off'}, ") +
+                              "intent: {horizon_s: 1, deviation_m: " + std::to_string(deviation_m) +
+                              ", deviation_rate_m_s: 0.01}, speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}, "
+                              "bodies: {cloth: {topic: cloth, topology: {rows: 2, cols: 2}, max_speed_m_s: 0.1}}"),
+               loads(liftUrdf(hand))) {
     driven.raise("base", 0);
+    if (with_table) driven.giveMap(1);
   }
   /// The answer to a frame of the cloth, 0.5 m high, with the plate at this height.
   const MonitorPipeline::Intended& step(double stamp_s, double plate_m) {
-    driven.tell({above("plate", plate_m, ros::Time(stamp_s)), above("tray", plate_m, ros::Time(stamp_s))});
+    for (const char* const link : {"plate", "tray", "hand"}) driven.tell({above(link, plate_m, ros::Time(stamp_s))});
     driven.feed(stamp_s, 0.5f);
     return driven.pipeline.intended();
   }
@@ -278,6 +279,121 @@ TEST(IntendedMotion, WhatIsWrongIsNamedAndNothingIsInForceThen) {
   EXPECT_EQ(lift.driven.pipeline.intend(twist(1, "", 0)), "header/frame_id is empty");
   IntendedMotion no_robot({1, 0.01, 0}, "", 1e-3);
   EXPECT_EQ(no_robot.take(lifts(1, {{0, 0}, {1, 1}}), 0), "joint_names: there is no robot (robot/description)");
+}
+
+// Until the next frame, too, nobody goes by a motion that is not meant any more.
+TEST(IntendedMotion, APromiseDoesNotOutliveItsMotionButNeverGetsLessThanByBounds) {
+  Lift lift;
+  MonitorPipeline& pipeline = lift.driven.pipeline;
+  const double bounds_s = (0.4 - 0.001) / 1.1;
+  const auto begin = [&](double stamp_s) {
+    lift.step(stamp_s, 0.1);
+    ASSERT_EQ(pipeline.intend(twist(stamp_s, "plate", -0.01)), "");
+    ASSERT_NE(pipeline.reconsider(), nullptr);
+    EXPECT_EQ(pipeline.reconsider(), nullptr) << "nothing new";
+    EXPECT_EQ(pipeline.intended().along.unused, "") << "at once";
+    EXPECT_EQ(pipeline.promises().broken(), "");
+    EXPECT_NEAR(lift.promised(), 1, 1e-6);
+    EXPECT_EQ(pipeline.speedScale(lift.driven.outcome).scale, 1);
+  };
+  lift.step(1, 0.1);
+  begin(1.1);
+  // What follows from there on, and is meant, too, as the one before until then: no less than before.
+  ASSERT_EQ(pipeline.intend(twist(1.15, "plate", -0.02)), "");
+  ASSERT_NE(pipeline.reconsider(), nullptr);
+  EXPECT_NEAR(lift.promised(), 1.05, 1e-6);
+  EXPECT_EQ(pipeline.promises().broken(), "");
+  // Up: the cloth comes at 0.1 m/s, the plate at 0.5, and the tube.
+  ASSERT_EQ(pipeline.intend(twist(1.15, "plate", 0.5)), "");
+  ASSERT_NE(pipeline.reconsider(), nullptr);
+  const double up_s = (0.399 - 0.01 + 0.05 * 0.51) / (0.5 + 0.1 + 0.01);
+  EXPECT_LE(lift.promised(), up_s);
+  EXPECT_GE(lift.promised(), 0.97 * up_s);
+  EXPECT_EQ(pipeline.promises().broken(), "something else is intended now");
+  // Refused: by bounds alone.
+  EXPECT_NE(pipeline.intend(twist(1.15, "", 0)), "");
+  ASSERT_NE(pipeline.reconsider(), nullptr);
+  EXPECT_NEAR(lift.promised(), bounds_s, 1e-3);
+  EXPECT_EQ(pipeline.promises().broken(), "something else is intended now");
+  EXPECT_NE(pipeline.intended().along.unused, "");
+  // The promise that is left is looked at, and that the plate went another way than was meant is nobody's fault.
+  lift.step(1.2, 0.14);
+  EXPECT_EQ(pipeline.promises().broken(), "");
+  EXPECT_EQ(pipeline.promises().counts().broken, 0u);
+  EXPECT_EQ(pipeline.promises().counts().kept, 1u);
+  // What a reset took away no motion brings back.
+  begin(1.3);
+  pipeline.reset(StepStatus::RESET, "reset");
+  ASSERT_EQ(pipeline.intend(twist(1.4, "plate", -0.01)), "");
+  EXPECT_EQ(pipeline.reconsider(), nullptr);
+  EXPECT_FALSE(pipeline.promises().promise().isPromise());
+}
+
+TEST(WouldTouch, TellsWhenAndWhereOrThatAllIsFree) {
+  using Answer = deformable_ccd::WouldTouch::Response;
+  Lift lift(0.01, true);
+  MonitorPipeline& pipeline = lift.driven.pipeline;
+  EXPECT_EQ(pipeline.wouldTouch(lifts(0, {{0, 0.1}, {1, 0.1}})).verdict, Answer::NOT_PROVED) << "no frame yet";
+  lift.step(1, 0.1);
+  lift.step(1.1, 0.1);
+  // Onto the table, 0.099 m below, at 0.05 m/s, in a tube of 0.01 m that grows by 0.01 m/s.
+  const Answer down = pipeline.wouldTouch(lifts(0, {{0, 0.1}, {4, -0.1}}));
+  EXPECT_EQ(down.verdict, Answer::TOUCHES) << down.reason;
+  EXPECT_LE(down.first, 0.089 / 0.06);
+  EXPECT_GE(down.first, 0.97 * 0.089 / 0.06);
+  EXPECT_EQ(down.bodies[0], "plate");
+  EXPECT_EQ(down.bodies[1], "octomap");
+  EXPECT_NEAR(down.point.z, (0.1 - 0.001 - 0.05 * down.first) / 2, 2e-3) << "between the two";
+  EXPECT_FALSE(down.assumed.empty());
+  // Up, the cloth, 0.399 m above, may come at 0.1 m/s.
+  const Answer up = pipeline.wouldTouch(lifts(0, {{0, 0.1}, {4, 0.9}}));
+  EXPECT_EQ(up.verdict, Answer::TOUCHES);
+  EXPECT_LE(up.first, 0.389 / 0.31);
+  EXPECT_GE(up.first, 0.97 * 0.389 / 0.31);
+  EXPECT_EQ(up.bodies[0], "cloth");
+  EXPECT_NEAR(up.point.x, 0.2, 0.06) << "in the cloth";
+  const Answer some = pipeline.wouldTouch(lifts(0, {{0, 0.1}, {1, 0.08}, {2, 0.12}}));
+  EXPECT_EQ(some.verdict, Answer::FREE) << some.reason;
+  EXPECT_NEAR(some.first, 2, 1e-6) << "to its end, beyond intent/horizon_s";
+  EXPECT_EQ(some.bodies[0], "");
+  // Nothing of it is in force.
+  EXPECT_EQ(lift.step(1.2, 0.1).along.unused, "no path is in force");
+}
+
+TEST(WouldTouch, FailsClosed) {
+  using Answer = deformable_ccd::WouldTouch::Response;
+  const std::vector<std::pair<double, double>> rest{{0, 0.1}, {1, 0.1}};
+  Lift lift(0.01, true, collision("<box size='0.1 0.1 0.002'/>"));
+  MonitorPipeline& pipeline = lift.driven.pipeline;
+  const auto reason = [&](const JointTrajectory& asked, const std::string& unproved = "") {
+    const Answer answer = pipeline.wouldTouch(asked, unproved);
+    EXPECT_EQ(answer.verdict, Answer::NOT_PROVED) << answer.reason;
+    return answer.reason;
+  };
+  lift.step(1, 0.1);
+  lift.step(1.1, 0.1);
+  EXPECT_EQ(reason(lifts(0, rest)), "joint_names: they move 'hand', but not alone");
+  JointTrajectory both = lifts(0, rest);
+  both.joint_names.push_back("plate_hand");
+  for (auto& point : both.points) point.positions.push_back(0);
+  lift.step(1.2, 0.1);
+  EXPECT_EQ(reason(both, "a frame waits"), "a frame waits");
+  JointTrajectory other = lifts(0, rest);
+  other.joint_names = {"elbow"};
+  EXPECT_EQ(reason(other), "joint_names[0] 'elbow' is no joint of the robot that turns or slides by itself");
+  both.points[1].time_from_start = ros::Duration(11);
+  EXPECT_EQ(reason(both), "it lasts longer than 10 s");
+  Lift alone(0.01, true);
+  alone.step(1, 0.1);
+  alone.step(1.1, 0.1);
+  const auto said = [&](const JointTrajectory& asked) { return alone.driven.pipeline.wouldTouch(asked); };
+  EXPECT_EQ(said(lifts(0, {{0, 0.2}, {1, 0.2}})).reason.substr(0, 35), "does not hold: the robot is 0.1 m o");
+  EXPECT_EQ(said(lifts(0, rest)).verdict, Answer::FREE);
+  alone.driven.pipeline.setPhase("");
+  EXPECT_EQ(said(lifts(0, rest)).verdict, Answer::FREE) << "it was none before";
+  alone.driven.feed(1.2, std::nanf(""));
+  EXPECT_EQ(said(lifts(0, rest)).verdict, Answer::NOT_PROVED);
+  EXPECT_NE(said(lifts(0, rest)).reason, "");
 }
 
 TEST(IntendedMotion, ACubicIsFollowedWhereThePointsHaveSpeeds) {
