@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dccd/tolerances.h"
 #include "module.h"
 
 namespace dccd {
@@ -43,6 +44,12 @@ void setPoses(Body& body, py::handle pose_t0, py::handle pose_t1) {
   body.pose_t0 = poseOf(pose_t0, "pose_t0");
   body.pose_t1 = poseOf(pose_t1, "pose_t1");
   body.turns = true;
+  const Eigen::Isometry3d motion = body.pose_t1 * body.pose_t0.inverse();
+  for (std::size_t v = 0; body.t0 && v < body.t0->size(); ++v) {
+    const double off_m = (motion * (*body.t0)[v] - (*body.t1)[v]).norm();  // not finite: it is unchecked
+    if (off_m <= tolerance::RIGID_PATH_M || !std::isfinite(off_m)) continue;
+    throw py::value_error("t1[" + std::to_string(v) + "] is not where the poses have t0[" + std::to_string(v) + "]");
+  }
 }
 
 NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::object edges, const TopologyPtr& mesh,

@@ -145,7 +145,12 @@ void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
   }
 }
 
-void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {
+void CollisionMonitor::Impl::onMap(std::size_t source, const ros::MessageEvent<RawMessage>& event) try {
+  RawMessage& message = *event.getMessage();
+  queue.command([this, topic = config.liveMapNames()[source], sender = event.getPublisherName(),
+                 frame_id = config.takesClouds() ? frameIdOf(message.bytes) : ""] {
+    pipeline.hearMap(topic, frame_id, sender);
+  });
   const std::int64_t now_ns = steadyNs();
   state.mapCame(now_ns);
   if (map_drops.mayLack(map_callbacks)) maps->lose(source);
@@ -223,7 +228,7 @@ void CollisionMonitor::Impl::subscribe() {
     const std::size_t source = map_subscribers.size();
     ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on
     options.initByFullCallbackType<boost::shared_ptr<RawMessage>>(
-        topic, MAP_QUEUE, [this, source](const boost::shared_ptr<RawMessage>& message) { onMap(source, *message); });
+        topic, MAP_QUEUE, [this, source](const ros::MessageEvent<RawMessage>& event) { onMap(source, event); });
     options.callback_queue = &map_callbacks;
     map_subscribers.push_back(input.subscribe(options));
   }

@@ -476,6 +476,7 @@ class ArraysTest(PythonTestCase):
                 ({'pose_t0': np.eye(4), 'pose_t1': turned}, ValueError, 'pose_t1 is no pose'),
                 ({'pose_t0': np.diag([1., 1, -1, 1]), 'pose_t1': np.eye(4)}, ValueError, 'pose_t0 is no pose'),
                 ({'pose_t0': np.eye(4), 'pose_t1': np.eye(3)}, ValueError, r'pose_t1 has shape \(3, 3\), expected \(4, 4\)'),
+                ({'pose_t0': np.eye(4), 'pose_t1': np.diag([-1., -1, 1, 1])}, ValueError, r't1\[\d\] is not where the poses have t0'),
                 ({'mesh': dccd.Mesh(6, FACES)}, TypeError, 'expected a mesh, or triangles, or edges'),
                 ({'colour': 1}, TypeError, 'incompatible constructor arguments')]:
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):

@@ -9,19 +9,19 @@ namespace dccd {
 namespace test {
 namespace {
 
-/// Two triangles that share an edge; the second one's corner on it `apart` above the first one's.
-std::vector<std::uint8_t> soup(double stamp_s, double apart) {
+/// Two triangles that share an edge, or but one of them; the second one's corner on it `apart` above the first one's.
+std::vector<std::uint8_t> soup(double stamp_s, double apart, std::size_t first = 0) {
   visualization_msgs::Marker out;
   out.header.stamp = ros::Time(stamp_s);
   out.header.frame_id = "world";
   out.type = visualization_msgs::Marker::TRIANGLE_LIST;
   out.scale.x = out.scale.y = out.scale.z = out.pose.orientation.w = 1;
   const double corners[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 1, apart}, {1, 0, apart}, {1, 1, 0}};
-  for (const auto& corner : corners) {
+  for (std::size_t i = 3 * first; i < 6; ++i) {
     geometry_msgs::Point point;
-    point.x = corner[0];
-    point.y = corner[1];
-    point.z = corner[2];
+    point.x = corners[i][0];
+    point.y = corners[i][1];
+    point.z = corners[i][2];
     out.points.push_back(point);
   }
   return bytesOf(out);
@@ -67,6 +67,26 @@ TEST(Weld, NumbersOfVerticesThatCameApartProveNothing) {
     EXPECT_EQ(said(0.5).proved, !is_masked) << describe(assuranceOf(welded.outcome));
     welded.pipeline.reset(StepStatus::RESET);
     EXPECT_TRUE(said(0.5).proved) << "numbered as they are now";
+  }
+}
+
+TEST(Weld, NumbersOfOtherTrianglesProveNothing) {
+  for (const auto& [names, is_masked] : {std::pair("", false), {"vertex_mask: [2]", true}}) {
+    Driven welded(scene(names));
+    double stamp_s = 1;
+    const auto said = [&](std::size_t first) {
+      for (int frame = 0; frame < 2; ++frame) {
+        welded.pipeline.take(0, {"visualization_msgs/Marker", soup(stamp_s += 0.1, 0, first), 0, 0});
+        EXPECT_TRUE(welded.pipeline.nextOutcome(0, welded.outcome));
+      }
+      EXPECT_TRUE(welded.outcome.answered) << welded.outcome.reason;
+      return assuranceOf(welded.outcome);
+    };
+    EXPECT_TRUE(said(0).proved);
+    EXPECT_EQ(said(1).proved, !is_masked) << describe(assuranceOf(welded.outcome));
+    EXPECT_EQ(said(0).proved, !is_masked) << "who counted meanwhile nobody knows";
+    welded.pipeline.reset(StepStatus::RESET);
+    EXPECT_TRUE(said(1).proved) << "numbered as they are now";
   }
 }
 
