@@ -44,12 +44,7 @@ void setPoses(Body& body, py::handle pose_t0, py::handle pose_t1) {
   body.pose_t0 = poseOf(pose_t0, "pose_t0");
   body.pose_t1 = poseOf(pose_t1, "pose_t1");
   body.turns = true;
-  const Eigen::Isometry3d motion = body.pose_t1 * body.pose_t0.inverse();
-  for (std::size_t v = 0; body.t0 && v < body.t0->size(); ++v) {
-    const double off_m = (motion * (*body.t0)[v] - (*body.t1)[v]).norm();  // not finite: it is unchecked
-    if (off_m <= tolerance::RIGID_PATH_M || !std::isfinite(off_m)) continue;
-    throw py::value_error("t1[" + std::to_string(v) + "] is not where the poses have t0[" + std::to_string(v) + "]");
-  }
+  if (body.t0) requireMoved(*body.t0, body.pose_t1 * body.pose_t0.inverse(), *body.t1, "t1");
 }
 
 NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::object edges, const TopologyPtr& mesh,
@@ -186,6 +181,14 @@ std::vector<SeparationFrom> separationsOf(const NamedBody& body, std::uint16_t s
 }
 
 }  // namespace
+
+void requireMoved(const Positions& from, const Eigen::Isometry3d& motion, const Positions& to, const char* name) {
+  for (std::size_t v = 0; v < from.size(); ++v) {
+    const double off_m = (motion * from[v] - to[v]).norm();
+    if (!(off_m > tolerance::RIGID_PATH_M) || !std::isfinite(off_m)) continue;
+    throw py::value_error(std::string(name) + "[" + std::to_string(v) + "] is not where the poses take it");
+  }
+}
 
 std::shared_ptr<const std::vector<double>> radiiOf(py::handle radii, const std::string& name) {
   const Doubles array = doublesOf(radii, name, {ANY});

@@ -120,6 +120,13 @@ class AuditTest(AnalyzeBagTestCase):
         status, _, said = self.audit(self.folder / 'none.bag')
         self.assertEqual(status, 2, said)
         self.assertRegex(said, r'^audit_bag: .*none\.bag')
+        odd = self.folder / 'odd.urdf'
+        for shape, status in (('<collision/>', 2), ('<collision><geometry><capsule radius="1" length="1"/></geometry></collision>', 3)):
+            odd.write_text('<robot name="odd"><link name="tool">%s</link></robot>' % shape)
+            config = self.folder / 'odd.yaml'
+            config.write_text(self.config.read_text() + 'robot: %s\n' % odd)
+            ran = run(TOOLS / 'audit_bag', self.out, '--params', config)
+            self.assertEqual(ran.returncode, status, ran.stdout + ran.stderr)
 
     def test_it_shares_nothing_and_is_read_in_an_hour(self):
         allowed = {'argparse', 'bisect', 'dataclasses', 'fractions', 'json', 'math', 'os', 'random', 're', 'struct', 'subprocess', 'sys',
