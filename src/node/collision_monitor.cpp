@@ -227,7 +227,7 @@ void CollisionMonitor::Impl::subscribe() {
   for (const std::string& topic : config.liveMapNames()) {
     const std::size_t source = map_subscribers.size();
     ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on
-    options.initByFullCallbackType<boost::shared_ptr<RawMessage>>(
+    options.initByFullCallbackType<const ros::MessageEvent<RawMessage>&>(
         topic, MAP_QUEUE, [this, source](const ros::MessageEvent<RawMessage>& event) { onMap(source, event); });
     options.callback_queue = &map_callbacks;
     map_subscribers.push_back(input.subscribe(options));

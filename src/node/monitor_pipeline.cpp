@@ -238,7 +238,7 @@ double MonitorPipeline::Source::hear(const DecodedMesh& mesh, const MeshMessage&
 }
 
 void MonitorPipeline::Senders::hear(const std::string& sender) {
-  if (sender.empty() || sender == last) return;
+  if (sender.empty() || sender == last || in_turn) return;
   in_turn = in_turn || sender == before;
   before = std::exchange(last, sender);
 }
