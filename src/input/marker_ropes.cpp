@@ -154,12 +154,12 @@ DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
   const bool goes_on = continues(known_ropes_, ropes.names);
   mesh.is_joined_anew = !goes_on && hasJoints();
   if (hasFixedTopology()) {
+    mesh.positions = std::move(ropes.points);
+    takeFixed(count, 0, 0, mesh);
     if (mesh.is_joined_anew) {  // the topology, being the same, would not tell
       throw WireError("its markers are not those of the message before, or have other numbers of points; send the same "
                       "ones each time, or call ~reset");
     }
-    mesh.positions = std::move(ropes.points);
-    takeFixed(count, 0, 0, mesh);
     addRadii(nullptr, mesh);
     known_ropes_ = std::move(ropes.names);
     return mesh;
