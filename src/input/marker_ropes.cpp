@@ -157,8 +157,9 @@ DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
     mesh.positions = std::move(ropes.points);
     takeFixed(count, 0, 0, mesh);
     if (mesh.is_joined_anew) {  // the topology, being the same, would not tell
-      throw WireError("its markers are not those of the message before, or have other numbers of points; send the same "
-                      "ones each time, or call ~reset");
+      throw WireError(
+          "its markers are not those of the message before, or have other numbers of points; send the same "
+          "ones each time, or call ~reset");
     }
     addRadii(nullptr, mesh);
     known_ropes_ = std::move(ropes.names);

@@ -147,10 +147,9 @@ void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
 
 void CollisionMonitor::Impl::onMap(std::size_t source, const ros::MessageEvent<RawMessage>& event) try {
   RawMessage& message = *event.getMessage();
-  queue.command([this, topic = config.liveMapNames()[source], sender = event.getPublisherName(),
-                 frame_id = config.takesClouds() ? frameIdOf(message.bytes) : ""] {
-    pipeline.hearMap(topic, frame_id, sender);
-  });
+  queue.command(
+      [this, topic = config.liveMapNames()[source], sender = event.getPublisherName(),
+       frame_id = config.takesClouds() ? frameIdOf(message.bytes) : ""] { pipeline.hearMap(topic, frame_id, sender); });
   const std::int64_t now_ns = steadyNs();
   state.mapCame(now_ns);
   if (map_drops.mayLack(map_callbacks)) maps->lose(source);

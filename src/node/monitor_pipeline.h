@@ -244,7 +244,7 @@ class MonitorPipeline {
     /// Of a frame; returns by how much its stamp is before that of the one before [s].
     double hear(const DecodedMesh& mesh, const MeshMessage& message);
   };
-  std::vector<Source> sources_;  // per body
+  std::vector<Source> sources_;                 // per body
   std::map<std::string, Senders> map_senders_;  // by topic and frame_id
   /// By what the newest cloud of a depth camera was placed in a fixed frame that is named.
   struct SeenFrom {

@@ -63,7 +63,8 @@ TEST(ClocksOfTwoComputers, OfTwoBodies) {
 
 // What holds at all times may be old, but nothing is of a time to come.
 TEST(ClocksOfTwoComputers, OfAStaticBody) {
-  for (const auto& [cloth_s, table_s, alike] : {std::tuple(0.0, -100.0, true), {2.0, -100.0, true}, {0.0, 2.0, false}}) {
+  for (const auto& [cloth_s, table_s, alike] :
+       {std::tuple(0.0, -100.0, true), {2.0, -100.0, true}, {0.0, 2.0, false}}) {
     Clocks bodies(scene("effects: {octomap: 'off'}, bodies: {a: {topic: a}, b: {topic: b, motion: static}}"));
     bodies.takeOf(1, 0, table_s, 1);
     for (int i = 0; i <= 10; ++i) {
