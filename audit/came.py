@@ -70,12 +70,12 @@ def grid(rows, cols):
 
 
 def fans(polygons, positions):
-    """Triangles of polygons, and how many could not be used. A polygon of more corners must be convex to be judged here."""
-    faces, lost = [], 0
-    for corners in polygons:
-        corners = [c for i, c in enumerate(corners) if c != corners[i - 1]]
+    """Triangles, and how many polygons are neither these nor lie in one. One of more corners must be convex to be judged here."""
+    faces, odd = [], []
+    for sent in polygons:
+        corners = [c for i, c in enumerate(sent) if c != sent[i - 1]]
         if len(set(corners)) != len(corners) or len(corners) < 3:
-            lost += 1
+            odd.append(set(sent))
             continue
         if len(corners) > 3:
             p = positions[corners]
@@ -83,7 +83,7 @@ def fans(polygons, positions):
             if not ((turns @ turns.sum(0)) > 0).all():
                 raise NotCovered('a polygon of %d corners that is not convex' % len(corners))
         faces += [[corners[0], corners[i], corners[i + 1]] for i in range(1, len(corners) - 1)]
-    return np.array(faces, int).reshape(-1, 3), lost
+    return np.array(faces, int).reshape(-1, 3), sum(len(one) > 2 or not any(one.issubset(face) for face in faces) for one in odd)
 
 
 def welded(corners):

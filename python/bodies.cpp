@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dccd/tolerances.h"
 #include "module.h"
 
 namespace dccd {
@@ -43,6 +44,7 @@ void setPoses(Body& body, py::handle pose_t0, py::handle pose_t1) {
   body.pose_t0 = poseOf(pose_t0, "pose_t0");
   body.pose_t1 = poseOf(pose_t1, "pose_t1");
   body.turns = true;
+  if (body.t0) requireMoved(*body.t0, body.pose_t1 * body.pose_t0.inverse(), *body.t1, "t1");
 }
 
 NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::object edges, const TopologyPtr& mesh,
@@ -179,6 +181,14 @@ std::vector<SeparationFrom> separationsOf(const NamedBody& body, std::uint16_t s
 }
 
 }  // namespace
+
+void requireMoved(const Positions& from, const Eigen::Isometry3d& motion, const Positions& to, const char* name) {
+  for (std::size_t v = 0; v < from.size(); ++v) {
+    const double off_m = (motion * from[v] - to[v]).norm();
+    if (!(off_m > tolerance::RIGID_PATH_M) || !std::isfinite(off_m)) continue;
+    throw py::value_error(std::string(name) + "[" + std::to_string(v) + "] is not where the poses take it");
+  }
+}
 
 std::shared_ptr<const std::vector<double>> radiiOf(py::handle radii, const std::string& name) {
   const Doubles array = doublesOf(radii, name, {ANY});

@@ -15,6 +15,10 @@
 namespace dccd {
 namespace python {
 
+/// Throws ValueError unless the motion takes each position to where it is, to RIGID_PATH_M. What is not finite is
+/// unchecked.
+void requireMoved(const Positions& from, const Eigen::Isometry3d& motion, const Positions& to, const char* name);
+
 /// As in doc/interface.md.
 constexpr const char* MAP_NAME = "octomap";
 constexpr const char* SELF_NAME = "self";

@@ -42,6 +42,7 @@ class Stream {
     MonitorOptions wanted;
     for (const auto& [key, value] : options) set(py::str(key), value, wanted);
     for (const Body& body : templates_) meshes_.push_back(body.topology);
+    last_.resize(templates_.size());
     monitor_ = std::make_unique<Monitor>(wanted, templates_);
   }
 
@@ -55,6 +56,10 @@ class Stream {
     frame.stamp_ns = stampOf(stamp_s);
     if (!pose.is_none()) frame.pose = poseOf(pose, "pose");
     frame.rigid = templates_[b].rigid && !pose.is_none();
+    if (frame.rigid && !mesh && last_[b].positions.size() == frame.positions.size()) {
+      requireMoved(last_[b].positions, frame.pose * last_[b].pose.inverse(), frame.positions, "positions");
+    }
+    if (frame.rigid) last_[b] = frame;
     if (!radius_m.is_none()) frame.radius_m = *radiiOf(radius_m, "radius_m");
     std::string status;
     locked([&] {
@@ -102,6 +107,7 @@ class Stream {
  private:
   std::vector<Body> templates_;
   std::vector<std::shared_ptr<const Topology>> meshes_;  // of the newest frames
+  std::vector<MeshFrame> last_;                          // that came with a pose
   std::unique_ptr<Monitor> monitor_;
   std::mutex mutex_;
   std::atomic<bool> interrupted_{false};

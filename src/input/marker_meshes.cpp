@@ -149,8 +149,10 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     const auto p = marker.points[i];
     corners[i] = Vec3(p[0], p[1], p[2]);
   }
+  const bool had_joints = hasJoints();
   if (!known_ropes_.empty()) forgetJoints();  // they are of their ends
   const bool welds_anew = weld_.vertexOfCorner().size() != count;
+  mesh.is_joined_anew = had_joints && welds_anew;
   if (config_.weld && config_.source != TopologySource::FILE) {
     mesh.weld_changes = weld_.weld(corners);
   } else {

@@ -151,13 +151,21 @@ DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
   mesh.stamp_ns = first->header.stamp_ns;  // so that no time that is reported is late
   checkCount(count);
   Ropes ropes = ropesOf(markers);
+  const bool goes_on = continues(known_ropes_, ropes.names);
+  mesh.is_joined_anew = !goes_on && hasJoints();
   if (hasFixedTopology()) {
     mesh.positions = std::move(ropes.points);
     takeFixed(count, 0, 0, mesh);
+    if (mesh.is_joined_anew) {  // the topology, being the same, would not tell
+      throw WireError(
+          "its markers are not those of the message before, or have other numbers of points; send the same "
+          "ones each time, or call ~reset");
+    }
     addRadii(nullptr, mesh);
+    known_ropes_ = std::move(ropes.names);
     return mesh;
   }
-  SoupWeld weld = continues(known_ropes_, ropes.names) ? weld_ : SoupWeld();
+  SoupWeld weld = goes_on ? weld_ : SoupWeld();
   mesh.weld_changes = joinEnds(config_.weld, weld, ropes);
   if (ropes.edges.empty()) {
     throw MeshError(StepStatus::BAD_MESSAGE, "there is nothing to check: the lines have no length");

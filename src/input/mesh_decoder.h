@@ -63,6 +63,7 @@ struct PassedOver : MeshError {
 struct DecodedMesh : MeshFrame {
   std::string frame_id;
   std::size_t weld_changes = 0;    ///< welded vertices whose corners came apart
+  bool is_joined_anew = false;     ///< of other markers, or of another number of corners, than the mesh before
   std::size_t unread_markers = 0;  ///< that are shown beside those that were taken, and not drawn of these: unchecked
   std::string unread_marker;       ///< the first of them: its name, and what it is
   bool has_others = false;         ///< beside it came what may be things, by names that are not the wanted ones
@@ -102,6 +103,7 @@ class MeshDecoder {
   MarkerNames names_;
   ShownMarkers shown_;
 
+  bool hasJoints() const { return !known_ropes_.empty() || !weld_.vertexOfCorner().empty(); }
   void forgetJoints() {
     weld_.forget();
     known_ropes_.clear();

@@ -38,10 +38,11 @@ std::optional<LoadedMap> BagClouds::hearCameraInfo(const rosbag::MessageInstance
   return void_map;
 }
 
-void BagClouds::hold(const rosbag::MessageInstance& message) {
+std::string BagClouds::hold(const rosbag::MessageInstance& message) {
   const std::size_t source = sourceOf(message);
   if (held_[source] && clouds_.hasFrame()) clouds_.miss(source, "too many came, and it gave way to a newer one");
   held_[source] = CloudMessage{source, message.getDataType(), bytesOf(message), receiptOf(message)};
+  return frameIdOf(held_[source]->bytes);
 }
 
 void BagClouds::refuse(const rosbag::MessageInstance& message, const std::string& problem) {

@@ -22,7 +22,8 @@ class BagClouds {
   /// A message of any topic: what is of none of infoTopics() is left alone. Returns what it makes of the map: nothing,
   /// or that this is void, for the message says where a picture really was.
   std::optional<LoadedMap> hearCameraInfo(const rosbag::MessageInstance& message);
-  void hold(const rosbag::MessageInstance& message);
+  /// Returns its frame_id.
+  std::string hold(const rosbag::MessageInstance& message);
   void refuse(const rosbag::MessageInstance& message, const std::string& problem);
   /// What the map is with each cloud that is held, once.
   std::vector<LoadedMap> take(const std::string& fixed_frame);

@@ -126,9 +126,10 @@ struct BagReplay::Run {
     const MonitorConfig& config = pipeline.config();
     if (config.takesClouds()) {
       const std::string problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
-      if (problem.empty()) return clouds.hold(message);
+      if (problem.empty()) return pipeline.hearMap(message.getTopic(), clouds.hold(message), message.getCallerId());
       clouds.refuse(message, problem);
     }
+    pipeline.hearMap(message.getTopic(), "", message.getCallerId());
     setMap(readMap(message, config, memory, &odds), static_cast<std::int64_t>(message.getTime().toNSec()));
   }
 

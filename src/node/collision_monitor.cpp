@@ -152,7 +152,11 @@ void CollisionMonitor::Impl::complainOfIntended(const std::string& problem) {
   log.complain("intended " + kind, private_node.resolveName("intended"), problem);
 }
 
-void CollisionMonitor::Impl::onMap(std::size_t source, RawMessage& message) try {
+void CollisionMonitor::Impl::onMap(std::size_t source, const ros::MessageEvent<RawMessage>& event) try {
+  RawMessage& message = *event.getMessage();
+  queue.command(
+      [this, topic = config.liveMapNames()[source], sender = event.getPublisherName(),
+       frame_id = config.takesClouds() ? frameIdOf(message.bytes) : ""] { pipeline.hearMap(topic, frame_id, sender); });
   const std::int64_t now_ns = steadyNs();
   state.mapCame(now_ns);
   if (map_drops.mayLack(map_callbacks)) maps->lose(source);
@@ -229,8 +233,8 @@ void CollisionMonitor::Impl::subscribe() {
   for (const std::string& topic : config.liveMapNames()) {
     const std::size_t source = map_subscribers.size();
     ros::SubscribeOptions options;  // for messages that nobody else holds, so that their bytes can go on
-    options.initByFullCallbackType<boost::shared_ptr<RawMessage>>(
-        topic, MAP_QUEUE, [this, source](const boost::shared_ptr<RawMessage>& message) { onMap(source, *message); });
+    options.initByFullCallbackType<const ros::MessageEvent<RawMessage>&>(
+        topic, MAP_QUEUE, [this, source](const ros::MessageEvent<RawMessage>& event) { onMap(source, event); });
     options.callback_queue = &map_callbacks;
     map_subscribers.push_back(input.subscribe(options));
   }

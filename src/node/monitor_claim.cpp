@@ -101,6 +101,9 @@ void MonitorPipeline::nameMissing(Outcome& outcome) const {
 }
 
 std::string MonitorPipeline::newerMapProblem(std::int64_t came_ns, std::int64_t now_ns, const ObstacleMap& map) const {
+  for (const auto& [topic, senders] : map_senders_) {
+    if (map.surface && senders.in_turn) return senders.problem("maps on " + topic);
+  }
   for (const UnplacedMap& one : unplaced_maps_) {
     if (!map.surface || one.map.arrival_ns > came_ns) continue;  // without a map NO_MAP says why
     return "an octomap that came before this frame has no place: no transform of its frame '" + one.map.frame_id +
@@ -115,10 +118,12 @@ std::string MonitorPipeline::newerMapProblem(std::int64_t came_ns, std::int64_t 
 /// Where all stamps are ahead alike, it is the clock here that is behind, and nothing is apart in time.
 void MonitorPipeline::answerForClocks(const Step& step, Claim& claim) const {
   const std::optional<double> clock_s = sources_[config_.monitor.clock_body].lead.seconds();
-  const auto problem = [&](const std::string& name, const std::optional<double>& ahead_s) -> std::string {
+  // What holds at all times may be old.
+  const auto problem = [&](const std::string& name, const std::optional<double>& ahead_s,
+                           bool may_be_old = false) -> std::string {
     if (!clock_s || !ahead_s) return "";  // none has said yet when it came
     const bool is_ahead = *ahead_s > MOST_AHEAD_S && *ahead_s - *clock_s > MOST_AHEAD_S;
-    const bool is_behind = *clock_s > MOST_AHEAD_S && *clock_s - *ahead_s > MOST_LATE_S;
+    const bool is_behind = !may_be_old && *clock_s > MOST_AHEAD_S && *clock_s - *ahead_s > MOST_LATE_S;
     if (!is_ahead && !is_behind) return "";
     return "stamps of " + name + " are up to " + timesOf(*ahead_s) + " than they come, those of body '" +
            config_.bodies[config_.monitor.clock_body].body.name + "' " + timesOf(*clock_s) +
@@ -129,10 +134,10 @@ void MonitorPipeline::answerForClocks(const Step& step, Claim& claim) const {
     if (rigid && !rigid->isNone()) frames.insert(rigid->frame);
   }
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
-    const bool is_stream = b < sources_.size() && !isStatic(b);
+    const bool is_sent = b < sources_.size(), is_stream = is_sent && !isStatic(b);
     if (is_stream && !sources_[b].frame.empty()) frames.insert(sources_[b].frame);
-    claim.answer(Question::CLOCK,
-                 is_stream ? problem("body '" + step.bodies[b].name + "'", sources_[b].lead.seconds()) : "", b);
+    const std::string name = "body '" + step.bodies[b].name + "'";
+    claim.answer(Question::CLOCK, is_sent ? problem(name, sources_[b].lead.seconds(), !is_stream) : "", b);
   }
   claim.answer(Question::MAP_CLOCK,
                step.map.surface ? problem("maps on " + config_.mapName(), map_lead_.seconds()) : "");
@@ -206,11 +211,8 @@ std::vector<std::string> MonitorPipeline::learntFramesProblems(const Step& step)
 
 /// What tf carries nobody else sends.
 std::string MonitorPipeline::sendersProblem(std::size_t body) const {
-  if (body >= sources_.size() || !sources_[body].senders.in_turn) return "";
-  const Senders& senders = sources_[body].senders;
-  return "frames of body '" + config_.bodies[body].body.name + "' came in turn from two publishers, " +
-         shortText(senders.before) + " and " + shortText(senders.last) +
-         ": which of them shows it is not known (~reset forgets both)";
+  if (body >= sources_.size()) return "";
+  return sources_[body].senders.problem("frames of body '" + config_.bodies[body].body.name + "'");
 }
 
 /// A camera may move: of its place the time of its newest cloud counts alone, and all that tf says of that, be it
@@ -232,7 +234,8 @@ std::vector<std::string> MonitorPipeline::transformsProblems() {
   return problems;
 }
 
-/// Corners that come apart number the vertices of a triangle soup anew: those that are named by number are others then.
+/// Another number of vertices, corners or ropes numbers them anew, and so do corners that come apart: those that are
+/// named by number are others then.
 std::string MonitorPipeline::numberingProblem(std::size_t b) const {
   if (b >= sources_.size() || !sources_[b].is_renumbered) return "";
   const BodyConfig& body = config_.bodies[b];
@@ -243,9 +246,9 @@ std::string MonitorPipeline::numberingProblem(std::size_t b) const {
   const std::vector<Expectation>& expected = config_.monitor.detector.expected;
   const bool is_named = !body.body.vertex_mask.empty() || std::any_of(expected.begin(), expected.end(), namesVertices);
   if (!is_named) return "";
-  return "corners of body '" + body.body.name +
-         "' came apart, which numbers its vertices anew, and vertex_mask or expected_contacts names them by number; "
-         "send a mesh with indices, or call ~reset";
+  return "vertices of body '" + body.body.name +
+         "' have other numbers than in its first frame, and vertex_mask or expected_contacts names them by number; "
+         "send a mesh with indices, the same ones each time; if the numbers fit the mesh of now, call ~reset";
 }
 
 /// Of the links and of what they hold, in the step's map.

@@ -238,14 +238,28 @@ double MonitorPipeline::Source::hear(const DecodedMesh& mesh, const MeshMessage&
   lead.add(mesh.stamp_ns, message.receipt_ns);
   senders.hear(message.sender);
   if (frame != mesh.frame_id) frame = mesh.frame_id;
-  is_renumbered = is_renumbered || mesh.weld_changes > 0;
+  const std::size_t before = std::exchange(vertices, mesh.positions.size());
+  const bool has_others = before != 0 && before != vertices;
+  is_renumbered = is_renumbered || has_others || mesh.weld_changes > 0 || mesh.is_joined_anew;
   return secondsBetween(mesh.stamp_ns, before_ns);
 }
 
 void MonitorPipeline::Senders::hear(const std::string& sender) {
-  if (sender.empty() || sender == last) return;
+  if (sender.empty() || sender == last || in_turn) return;
   in_turn = in_turn || sender == before;
   before = std::exchange(last, sender);
+}
+
+void MonitorPipeline::hearMap(const std::string& topic, const std::string& frame_id, const std::string& sender) {
+  constexpr std::size_t MOST_VIEWS = 64;  // a publisher may make up a frame_id for each cloud
+  const std::string view = frame_id.empty() ? topic : topic + " of frame '" + frame_id + "'";
+  map_senders_[map_senders_.size() < MOST_VIEWS || map_senders_.count(view) > 0 ? view : topic].hear(sender);
+}
+
+std::string MonitorPipeline::Senders::problem(const std::string& what) const {
+  if (!in_turn) return "";
+  return what + " came in turn from two publishers, " + shortText(before) + " and " + shortText(last) +
+         ": which of them shows it is not known (~reset forgets both)";
 }
 
 StatsContext MonitorPipeline::counters() const {
@@ -296,8 +310,11 @@ void MonitorPipeline::reset(StepStatus status, const std::string& why) {
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
   map_doubts_.assign(config_.bodies.size(), std::nullopt);
-  for (Source& source : sources_) source.lead = {}, source.senders = {}, source.is_renumbered = false;
+  for (Source& source : sources_) {
+    source.lead = {}, source.senders = {}, source.vertices = 0, source.is_renumbered = false;
+  }
   map_lead_ = {};
+  map_senders_.clear();
   missed_before_.clear();
   for (const MissedClouds& missed : missed_clouds_) missed_before_.push_back(missed.count);
   learnAnew(status);

@@ -71,6 +71,8 @@ class MonitorPipeline {
   /// From the next message on. Null: meshes are taken as they come. Rigid bodies' files always are.
   void setTopologyFilter(TopologyFilter filter) { topology_filter_ = std::move(filter); }
   void setMap(LoadedMap map, std::int64_t now_ns);
+  /// A message came that the map is made of. `frame_id`: of a cloud, which tells sensors apart; of a map empty.
+  void hearMap(const std::string& topic, const std::string& frame_id, const std::string& sender);
   /// When the newest map that is in use or was refused came; one that was set and has no place yet is neither.
   std::int64_t settledMapNs() const {
     return monitor_->mapInUse().arrival_ns == monitor_->map().arrival_ns ? settled_map_ns_
@@ -241,17 +243,20 @@ class MonitorPipeline {
     std::string last, before;
     bool in_turn = false;
     void hear(const std::string& sender);
+    std::string problem(const std::string& what) const;
   };
   struct Source {
     StampLead lead;
     Senders senders;
+    std::size_t vertices = 0;                                // of the last frame
     bool is_renumbered = false;                              // its vertices, since the first frame
     StampNs stamp_ns = std::numeric_limits<StampNs>::min();  // of the last frame
     std::string frame;                                       // of the last message
     /// Of a frame; returns by how much its stamp is before that of the one before [s].
     double hear(const DecodedMesh& mesh, const MeshMessage& message);
   };
-  std::vector<Source> sources_;  // per body
+  std::vector<Source> sources_;                 // per body
+  std::map<std::string, Senders> map_senders_;  // by topic and frame_id
   /// By what the newest cloud of a depth camera was placed in a fixed frame that is named.
   struct SeenFrom {
     std::string frame;

@@ -25,7 +25,8 @@ AUDIT = CHECKOUT / 'audit'
 FILES = [AUDIT / name for name in ('audit_bag', 'came.py', 'owned.py', 'placed.py', 'touches.py')]
 QUERIES = pathlib.Path(os.environ.get('DEFORMABLE_CCD_DATA', CHECKOUT.parent / 'shared/data')) / 'ccd_queries'
 sys.path.insert(0, str(AUDIT))
-import touches  # noqa: E402  (it lies beside the tool)
+import came  # noqa: E402  (it lies beside the tool)
+import touches  # noqa: E402
 sys.path.insert(0, str(CHECKOUT / 'test/storm'))
 import worlds  # noqa: E402
 
@@ -120,6 +121,18 @@ class AuditTest(AnalyzeBagTestCase):
         status, _, said = self.audit(self.folder / 'none.bag')
         self.assertEqual(status, 2, said)
         self.assertRegex(said, r'^audit_bag: .*none\.bag')
+        odd = self.folder / 'odd.urdf'
+        for shape, status in (('<collision/>', 2), ('<collision><geometry><capsule radius="1" length="1"/></geometry></collision>', 3)):
+            odd.write_text('<robot name="odd"><link name="tool">%s</link></robot>' % shape)
+            config = self.folder / 'odd.yaml'
+            config.write_text(self.config.read_text() + 'robot: %s\n' % odd)
+            ran = run(TOOLS / 'audit_bag', self.out, '--params', config)
+            self.assertEqual(ran.returncode, status, ran.stdout + ran.stderr)
+
+    def test_a_face_that_lies_in_another_one_is_checked_with_it(self):
+        for odd, lost in (((1, 1, 1), 0), ((1, 1, 2), 0), ((3, 3, 3), 1), ((0, 0, 3), 1), ((0, 1, 0, 2), 1)):
+            faces, count = came.fans([(0, 1, 2), odd], None)
+            self.assertEqual((faces.tolist(), count), ([[0, 1, 2]], lost))
 
     def test_it_shares_nothing_and_is_read_in_an_hour(self):
         allowed = {'argparse', 'bisect', 'dataclasses', 'fractions', 'json', 'math', 'os', 'random', 're', 'struct', 'subprocess', 'sys',

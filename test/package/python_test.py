@@ -476,10 +476,20 @@ class ArraysTest(PythonTestCase):
                 ({'pose_t0': np.eye(4), 'pose_t1': turned}, ValueError, 'pose_t1 is no pose'),
                 ({'pose_t0': np.diag([1., 1, -1, 1]), 'pose_t1': np.eye(4)}, ValueError, 'pose_t0 is no pose'),
                 ({'pose_t0': np.eye(4), 'pose_t1': np.eye(3)}, ValueError, r'pose_t1 has shape \(3, 3\), expected \(4, 4\)'),
+                ({'pose_t0': np.eye(4), 'pose_t1': np.diag([-1., -1, 1, 1])}, ValueError, r't1\[\d\] is not where the poses take it'),
                 ({'mesh': dccd.Mesh(6, FACES)}, TypeError, 'expected a mesh, or triangles, or edges'),
                 ({'colour': 1}, TypeError, 'incompatible constructor arguments')]:
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
                 dccd.detect(dccd.Body(t0, t1, FACES, **options))
+
+    def test_a_pose_that_contradicts_the_positions_is_refused(self):
+        stream = dccd.Stream(dccd.Body(mesh=dccd.Mesh(6, FACES), name='tool', rigid=True))
+        below = np.eye(4)
+        below[2, 3] = -1
+        stream.push(self.t0, 0, pose=np.eye(4))
+        stream.push(self.t0 + below[:3, 3], 0.1, pose=below)
+        with self.assertRaisesRegex(ValueError, r'positions\[0\] is not where the poses take it'):
+            stream.push(self.t0 + below[:3, 3], 0.2, pose=np.eye(4))
 
     def test_options_and_steps_are_refused_with_a_sentence(self):
         body = dccd.Body(self.t0, self.t1, FACES, name='cloth')

@@ -61,6 +61,23 @@ TEST(ClocksOfTwoComputers, OfTwoBodies) {
   }
 }
 
+// What holds at all times may be old, but nothing is of a time to come.
+TEST(ClocksOfTwoComputers, OfAStaticBody) {
+  for (const auto& [cloth_s, table_s, alike] :
+       {std::tuple(0.0, -100.0, true), {2.0, -100.0, true}, {0.0, 2.0, false}}) {
+    Clocks bodies(scene("effects: {octomap: 'off'}, bodies: {a: {topic: a}, b: {topic: b, motion: static}}"));
+    bodies.takeOf(1, 0, table_s, 1);
+    for (int i = 0; i <= 10; ++i) {
+      bodies.takeOf(0, 0.1 * i, cloth_s, 0);
+      while (bodies.pipeline.nextOutcome(0, bodies.outcome)) continue;
+    }
+    ASSERT_TRUE(bodies.outcome.answered) << table_s << " " << bodies.outcome.reason;
+    const Assurance said = assuranceOf(bodies.outcome);
+    EXPECT_EQ(said.proved, alike) << cloth_s << " " << table_s << " " << describe(said);
+    if (!alike) EXPECT_NE(describe(said).find("stamps of body 'b' are up to 2 s later"), std::string::npos);
+  }
+}
+
 // Once one of two that were ahead alike is set, what it was ahead by says nothing of the other.
 TEST(ClocksOfTwoComputers, OfWhichOneWasSet) {
   Clocks bodies(scene("effects: {octomap: 'off'}, bodies: {a: {topic: a}, b: {topic: b}}"));

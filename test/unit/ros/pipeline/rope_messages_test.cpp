@@ -2,6 +2,10 @@
 #include <geometry_msgs/PoseArray.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <fstream>
+
+#include "dccd/assurance.h"
+
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -64,6 +68,47 @@ TEST(RopeMessages, TwoRopesThatCross) {
     EXPECT_EQ(ropes.outcome.total_contacts, 0u);
     EXPECT_TRUE(assuranceOf(ropes.outcome).clear());
   }
+}
+
+/// Two ropes by their ids, of which the first has so many points of five; `above` the others of before.
+visualization_msgs::MarkerArray twoRopes(double stamp_s, std::int32_t id, std::size_t points, double above) {
+  visualization_msgs::MarkerArray out;
+  out.markers.resize(1);
+  out.markers[0].action = visualization_msgs::Marker::DELETEALL;
+  for (const auto& [first, count, z] : {std::tuple(id, points, above), {id + 1, 5 - points, above + 0.1}}) {
+    Positions places;
+    for (std::size_t i = 0; i < count; ++i) places.emplace_back(0.1 * static_cast<double>(i), 0, z);
+    out.markers.push_back(rope(stamp_s, first, MARKER_LINE_STRIP, places));
+  }
+  return out;
+}
+
+TEST(RopeMessages, NumbersOfOtherRopesProveNothing) {
+  Driven ropes(scene("vertex_mask: [0]"));
+  feed(ropes, twoRopes(1, 1, 2, 0));
+  feed(ropes, twoRopes(1.1, 1, 2, 0));
+  EXPECT_TRUE(assuranceOf(ropes.outcome).proved) << describe(assuranceOf(ropes.outcome));
+  // The second one is now the first, with the numbers of that; there are as many vertices, edges and ends as before.
+  feed(ropes, twoRopes(1.2, 2, 3, 0.1));
+  feed(ropes, twoRopes(1.3, 2, 3, 0.1));
+  EXPECT_TRUE(ropes.outcome.answered) << ropes.outcome.reason;
+  EXPECT_FALSE(assuranceOf(ropes.outcome).proved);
+  EXPECT_NE(describe(assuranceOf(ropes.outcome)).find("have other numbers than in its first frame"), std::string::npos);
+}
+
+// The topology that is given stays the same: that the points are others it cannot tell.
+TEST(RopeMessages, OtherMarkersOfAGivenTopologyAreRefused) {
+  const std::string file = ::testing::TempDir() + "five_points.obj";
+  std::ofstream(file) << "v 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nl 1 2\nl 3 4 5\n";
+  Driven ropes(scene("topology: {file: " + file + "}"));
+  feed(ropes, twoRopes(1, 1, 2, 0));
+  feed(ropes, twoRopes(1.1, 1, 2, 0));
+  EXPECT_TRUE(assuranceOf(ropes.outcome).proved) << describe(assuranceOf(ropes.outcome));
+  feed(ropes, twoRopes(1.2, 2, 3, 0.1));
+  EXPECT_EQ(ropes.outcome.status, StepStatus::BAD_MESSAGE) << ropes.outcome.reason;
+  feed(ropes, twoRopes(1.3, 1, 2, 0));
+  EXPECT_TRUE(ropes.outcome.answered) << ropes.outcome.reason;
+  EXPECT_FALSE(assuranceOf(ropes.outcome).proved) << "one between came and was not used";
 }
 
 TEST(RopeMessages, AnotherRopeIsASeam) {

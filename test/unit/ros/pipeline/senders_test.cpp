@@ -39,6 +39,27 @@ TEST_F(TwoPublishers, InTurnTheyProveNothingUntilAReset) {
   EXPECT_TRUE(saidAfter({"/a", "/a"}).proved);
 }
 
+TEST(TwoMapServers, InTurnTheyProveNothingUntilAReset) {
+  Driven cell(scene());
+  double now_s = 1;
+  const auto saidAfter = [&](const std::vector<std::array<std::string, 2>>& frames_and_senders) {
+    for (const auto& [frame, sender] : frames_and_senders) {
+      cell.pipeline.hearMap("/map", frame, sender);
+      cell.giveMap(now_s += 0.1);
+      for (int i = 0; i < 2; ++i) cell.feed(now_s += 0.1, 0.3f);
+    }
+    return assuranceOf(cell.outcome);
+  };
+  EXPECT_TRUE(saidAfter({{"", "/a"}, {"", "/a"}, {"", "/b"}}).proved) << "started anew";
+  EXPECT_TRUE(saidAfter({{"left", "/a"}, {"right", "/b"}, {"left", "/a"}}).proved) << "two sensors";
+  EXPECT_FALSE(saidAfter({{"", "/a"}}).proved);
+  EXPECT_NE(describe(assuranceOf(cell.outcome)).find("maps on /map came in turn from two publishers, /b and /a"),
+            std::string::npos)
+      << describe(assuranceOf(cell.outcome));
+  cell.pipeline.reset(StepStatus::RESET, "a test");
+  EXPECT_TRUE(saidAfter({{"", "/a"}}).proved);
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd
