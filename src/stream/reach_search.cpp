@@ -13,6 +13,26 @@ namespace {
 
 constexpr double ROUNDING = 1e-12;  // of a coordinate on a straight way between two
 
+/// The point of a triangle that is closest to p (Ericson, Real-Time Collision Detection, 5.1.5), up to rounding: it is
+/// a point of the triangle in any case.
+Vec3 closestOn(const std::array<Vec3, 3>& t, const Vec3& p) {
+  const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = p - t[0], bp = p - t[1], cp = p - t[2];
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp), d6 = ac.dot(cp);
+  const auto along = [](const Vec3& from, const Vec3& way, double u) -> Vec3 {
+    return from + (std::isfinite(u) ? std::clamp(u, 0.0, 1.0) : 0.0) * way;
+  };
+  if (d1 <= 0 && d2 <= 0) return t[0];
+  if (d3 >= 0 && d4 <= d3) return t[1];
+  if (d6 >= 0 && d5 <= d6) return t[2];
+  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return along(t[0], ab, d1 / (d1 - d3));
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return along(t[0], ac, d2 / (d2 - d6));
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return along(t[1], t[2] - t[1], (d4 - d3) / ((d4 - d3) + (d5 - d6)));
+  const double v = vb / (va + vb + vc), w = vc / (va + vb + vc);
+  if (!(v >= 0 && w >= 0 && v + w <= 1)) return t[0];
+  return t[0] + v * ab + w * ac;
+}
+
 /// What a face may reach.
 struct FaceReach {
   double lo[3], hi[3], near_m;
@@ -232,19 +252,16 @@ class ReachSearch {
       const Vec3 middle = middleOf(cube.box), point = body_from_map * middle;
       const double near_m = halfOf(cube.box) + body.reach_m + slack_m;
       if (shape.bounds().squaredExteriorDistance(point) > near_m * near_m) return;
-      const RigidShape::Away away = shape.away(point, near_m);
-      const bool is_sure = away.most_m < within_m || away.least_m > near_m;
-      const bool is_reached =
-          is_sure ? away.most_m < within_m : shape.anyNear(point, near_m, [&](std::uint32_t number) {
-            const double away2 = (closestOn(shape.face(number), point) - point).squaredNorm();
-            if (away2 > near_m * near_m) return false;
-            if (away2 < within_m * within_m) return true;
-            const Face& f = topology.faces()[number];
-            const std::array<Vec3, 3> t{moved * frame.positions[f[0]], moved * frame.positions[f[1]],
-                                        moved * frame.positions[f[2]]};
-            FaceReach reach;
-            return reach.find(t, body.reach_m) && reaches(t, reach, cube.box);
-          });
+      const bool is_reached = shape.anyNear(point, near_m, [&](std::uint32_t number) {
+        const double away2 = (closestOn(shape.face(number), point) - point).squaredNorm();
+        if (away2 > near_m * near_m) return false;
+        if (away2 < within_m * within_m) return true;
+        const Face& f = topology.faces()[number];
+        const std::array<Vec3, 3> t{moved * frame.positions[f[0]], moved * frame.positions[f[1]],
+                                    moved * frame.positions[f[2]]};
+        FaceReach reach;
+        return reach.find(t, body.reach_m) && reaches(t, reach, cube.box);
+      });
       // A cube that no face reaches has its middle half a voxel from all of them at the least.
       if (is_reached || (topology.isClosed() && !body.shell && shape.holds(point))) settle(i, body);
     });

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -17,10 +18,6 @@ namespace dccd {
 /// Whether the point is inside of a closed surface, as the start state has it: a half-line crosses an odd number of
 /// faces, exactly, whichever way they are turned. Vertices are finite.
 bool isInside(const Positions& positions, const std::vector<Face>& faces, const Vec3& point);
-
-/// The point of a triangle that is closest to p (Ericson, Real-Time Collision Detection, 5.1.5), up to rounding: it is
-/// a point of the triangle in any case.
-Vec3 closestOn(const std::array<Vec3, 3>& t, const Vec3& p);
 
 /// Not thread-safe.
 class RigidShape {
@@ -50,11 +47,6 @@ class RigidShape {
   }
   /// The same as isInside() for a point that is at least half a voxel from the surface of a closed body.
   bool holds(const Vec3& point);
-  /// How far a point is from the faces, between two bounds [m]; what is farther than far_m need not be told apart.
-  struct Away {
-    double least_m, most_m;
-  };
-  Away away(const Vec3& point, double far_m);
 
  private:
   std::shared_ptr<const Topology> topology_;
@@ -65,17 +57,9 @@ class RigidShape {
   BoxGrid faces_;
   std::vector<std::uint64_t> asked_;  // per face, the last question that came to it
   std::uint64_t question_ = 0;
-  /// A cell of a grid of which somebody asked: how far its middle is from the faces, and whether it is inside.
-  struct Cell {
-    std::uint64_t number = ~std::uint64_t{0};
-    float least_m = -1, most_m = 0;  // below 0: nobody asked
-    std::int8_t inside = -1;         // the same
-  };
-  std::vector<Cell> cells_;  // by a hash of the number: the newest takes the place of an older one
+  std::unordered_map<std::uint64_t, bool> inside_;  // by cell of a grid, as far as anybody asked
 
   void build(const MeshFrame& frame, double resolution_m);
-  /// Its cell, of which `middle` is set; null: it is too far off to have a number.
-  Cell* cellOf(const Vec3& point, Vec3& middle);
 };
 
 /// By number of body.

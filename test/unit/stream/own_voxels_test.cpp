@@ -151,7 +151,7 @@ TEST_F(OwnVoxels, BesideTheStepsTheyAreTheSame) {
       z -= 0.002;
       outcomes = both([&](Monitor& monitor) { monitor.push(0, sheet(now_ns, z), NOW); });
       waited += beside->mapWaitsSince().has_value();
-    } while ((!outcomes[0].step || outcomes[0].step->map.stamp_ns < map_ns) && now_ns < 100000 * MS);
+    } while ((!outcomes[0].obstacle || outcomes[0].step->map.stamp_ns < map_ns) && now_ns < 100000 * MS);
     for (const Outcome& outcome : outcomes) ASSERT_EQ(outcome.step->map.stamp_ns, map_ns);
     EXPECT_EQ(own(outcomes[0]), own(outcomes[1])) << n;
     EXPECT_EQ(doubted(outcomes[0]), doubted(outcomes[1])) << n;
