@@ -82,10 +82,16 @@ std::vector<Expectation> MonitorConfig::expectedIn(const std::string& some_phase
   for (const Expectation& one : expected_contacts) {
     if (one.phase.empty() || one.phase == some_phase) expected.push_back(one);
   }
-  for (const Hold& hold : holds) {
-    if (hold.closed) expected.insert(expected.end(), hold.contacts.begin(), hold.contacts.end());
-  }
+  for (const Expectation& one : held()) expected.push_back(one);
   return expected;
+}
+
+std::vector<Expectation> MonitorConfig::held() const {
+  std::vector<Expectation> held;
+  for (const Hold& hold : holds) {
+    if (hold.closed) held.insert(held.end(), hold.contacts.begin(), hold.contacts.end());
+  }
+  return held;
 }
 
 }  // namespace dccd

@@ -125,6 +125,7 @@ struct MonitorConfig {
   std::string phasesInWords() const;
   /// What is expected in that phase, and of what hands hold now.
   std::vector<Expectation> expectedIn(const std::string& some_phase) const;
+  std::vector<Expectation> held() const;  ///< of what is expected, what closed hands hold
   /// The map is made of clouds.
   bool takesClouds() const { return cloud_named; }
   /// octomap_file in the place of a live map, not beside it.

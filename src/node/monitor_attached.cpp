@@ -134,6 +134,7 @@ void MonitorPipeline::expectNow(const std::string& phase) {
     excluded.push_back("what is attached against links and against each other");
   reconfigure([&](MonitorOptions& options, MarkerConfig&) {
     options.detector.expected = expected;
+    options.held = config_.held();
     options.detector.excluded = excluded;
   });
 }

@@ -27,6 +27,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, TransformFeed& transforms
   loadFiles();
   findSets();
   config_.monitor.detector.expected = config_.expectedIn(config_.phase);
+  config_.monitor.held = config_.held();
   excluded_ = config_.monitor.detector.excluded;
   config_.monitor.in_cell = true;
   monitor_ = std::make_unique<Monitor>(config_.monitor, config_.monitorBodies());

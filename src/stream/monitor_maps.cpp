@@ -108,6 +108,11 @@ std::vector<TrackedBody> Monitor::Impl::tracked() const {
     if (!ownsVoxels(bodies[b])) continue;
     tracked.push_back({static_cast<std::uint16_t>(b), bodies[b].name, bodies[b].own_voxels_m, &stores[b], !isStream(b),
                        bodies[b].shell, !bodies[b].link.empty()});
+    for (const Expectation& one : options.held) {
+      for (const std::size_t side : {0, 1}) {
+        if (one.partners[side].body == b) tracked.back().held.add(one.partners[1 - side].body);
+      }
+    }
   }
   return tracked;
 }

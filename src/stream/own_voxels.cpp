@@ -80,7 +80,7 @@ void OwnVoxelFinder::listChanges(Look& look) {
   for (auto& [key, voxel] : stated_) {
     const OccupiedLeaf leaf{voxel.key, 1};
     voxel.shown = coverage(now, leaf) == VoxelTree::Coverage::FULL;
-    look.ask(leaf, Why::STATED, voxel.state == VoxelState::DOUBT ? BodySet() : look.groupsOf(voxel.owners));
+    look.ask(leaf, Why::STATED, voxel.state == VoxelState::DOUBT ? BodySet() : look.askedWith(voxel.owners));
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <unordered_set>
 #include <vector>
@@ -17,21 +18,24 @@ struct OwnVoxelFinder::Look {
   const VoxelTree& sure;
   RigidShapes& shapes;
   bool trust_first, is_gap;
-  bool is_blind;                      // the gap is longer than any way that is known
-  std::set<int> seamed{}, not_yet{};  // bodies of which some of the way is not known; whose first frame is later
-  std::set<int> lost{};               // of which it was known, and is here no more but from the map before on
-  std::set<int> links{};              // of a robot
-  std::vector<KeyBox> boxes{};        // of bodies
-  KeyBox region{};                    // around all of them
-  std::vector<ReachedCube> cubes{};   // of which it matters who reached them
-  std::vector<Stated> appeared{};     // what is own or in doubt from now on
+  bool is_blind;                        // the gap is longer than any way that is known
+  std::set<int> seamed{}, not_yet{};    // bodies of which some of the way is not known; whose first frame is later
+  std::set<int> lost{};                 // of which it was known, and is here no more but from the map before on
+  std::map<int, BodySet> asked_with{};  // of each body: its group, what it holds or is held by
+  std::vector<KeyBox> boxes{};          // of bodies
+  KeyBox region{};                      // around all of them
+  std::vector<ReachedCube> cubes{};     // of which it matters who reached them
+  std::vector<Stated> appeared{};       // what is own or in doubt from now on
   std::unordered_set<std::uint64_t> unknown{};  // packed, of what appeared, and the map before left out
   std::vector<OccupiedLeaf> hidden{};           // obstacles, remembered from now on
   SeenAlone seen_alone{};                       // from now on
 
-  BodySet groupsOf(const BodySet& bodies) const {
+  /// Who may go on to account for what these do.
+  BodySet askedWith(const BodySet& owners) const {
     BodySet found;
-    for (const std::uint16_t body : bodies) found.add(links.count(body) > 0 ? TrackedBody::LINKS : body);
+    for (const std::uint16_t owner : owners) {
+      for (const std::uint16_t body : asked_with.at(owner)) found.add(body);
+    }
     return found;
   }
   bool mayBeNear() const { return !seamed.empty() || !lost.empty(); }

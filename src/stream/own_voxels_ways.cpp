@@ -107,12 +107,14 @@ std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodi
   return ways;
 }
 
-/// Which are links, and of which bodies it is not known where they were at some time since the map before. Before its
-/// first frame a body is nowhere.
+/// Who is asked with whom, and of which bodies it is not known where they were at some time since the map before.
+/// Before its first frame a body is nowhere.
 void OwnVoxelFinder::findSeams(Look& look, const std::vector<TrackedBody>& bodies, double lag_s) {
   const StampNs since_ns = pathNeededFrom(look.map.stamp_ns, lag_s);
   for (const TrackedBody& body : bodies) {
-    if (body.is_link) look.links.insert(body.body);
+    BodySet& asked = look.asked_with[body.body];
+    asked.add(body.group());
+    for (const std::uint16_t other : body.held) asked.add(other);
     const MeshStore& frames = *body.frames;
     if (frames.empty()) {
       look.not_yet.insert(body.body);

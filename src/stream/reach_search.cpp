@@ -124,7 +124,7 @@ class ReachSearch {
       const ReachedCube& cube = cubes_[i];
       const bool needs_all = whole_way_ || cube.why == ReachedCube::Why::APPEARED || !cube.asked.empty();
       const bool is_told = !needs_all && !cube.near.empty();
-      open_[i] = !is_told && (cube.asked.empty() || cube.asked.has(body.group()));
+      open_[i] = !is_told && (cube.asked.empty() || cube.asked.has(body.group()) || cube.asked.has(body.body));
       left_ += open_[i];
       if (whole_way_) places_of_[i] = {};
     }

@@ -14,23 +14,6 @@
 
 namespace dccd {
 
-/// A body whose frames tell where it was, and how far from its surface a voxel may be its own.
-struct TrackedBody {
-  std::uint16_t body = 0;
-  std::string name;
-  double reach_m = 0;  ///< Body::own_voxels_m
-  const MeshStore* frames = nullptr;
-  bool holds_always = false;  ///< static: its newest frame, at all stamps
-  bool shell = false;         ///< Body::shell: what is inside is not in it
-  bool is_link = false;       ///< Body::link is one
-
-  static constexpr std::uint16_t LINKS = 0xfffe;
-  /// All links of a robot are one.
-  std::uint16_t group() const { return is_link ? LINKS : body; }
-};
-
-using BodyWay = std::vector<MeshStore::Stretch>;
-
 /// Bodies by number, in the order in which they were added. Of more than MOST the others are left out.
 class BodySet {
  public:
@@ -53,13 +36,31 @@ class BodySet {
   std::uint8_t count_ = 0;
 };
 
+/// A body whose frames tell where it was, and how far from its surface a voxel may be its own.
+struct TrackedBody {
+  std::uint16_t body = 0;
+  std::string name;
+  double reach_m = 0;  ///< Body::own_voxels_m
+  const MeshStore* frames = nullptr;
+  bool holds_always = false;  ///< static: its newest frame, at all stamps
+  bool shell = false;         ///< Body::shell: what is inside is not in it
+  bool is_link = false;       ///< Body::link is one
+  BodySet held{};             ///< what it holds, or is held by
+
+  static constexpr std::uint16_t LINKS = 0xfffe;
+  /// All links of a robot are one.
+  std::uint16_t group() const { return is_link ? LINKS : body; }
+};
+
+using BodyWay = std::vector<MeshStore::Stretch>;
+
 /// A cube, why it is asked for, and the bodies that reach it.
 struct ReachedCube {
   enum class Why : std::uint8_t { APPEARED, VANISHED, REMEMBERED, STATED, SEEN };
   OccupiedLeaf leaf;
   Why why;
   LeafBox box;
-  BodySet asked{};   ///< of bodies of these groups alone; empty: of all
+  BodySet asked{};   ///< of these bodies and groups alone; empty: of all
   BodySet near{};    ///< within reach at some time; of a cube that did not appear the first one that was found will do
   BodySet always{};  ///< at each place that was asked for
 };

@@ -151,7 +151,7 @@ TEST_F(OwnVoxels, BesideTheStepsTheyAreTheSame) {
       z -= 0.002;
       outcomes = both([&](Monitor& monitor) { monitor.push(0, sheet(now_ns, z), NOW); });
       waited += beside->mapWaitsSince().has_value();
-    } while ((!outcomes[0].step || outcomes[0].step->map.stamp_ns < map_ns) && now_ns < 100000 * MS);
+    } while ((!outcomes[0].obstacle || outcomes[0].step->map.stamp_ns < map_ns) && now_ns < 100000 * MS);
     for (const Outcome& outcome : outcomes) ASSERT_EQ(outcome.step->map.stamp_ns, map_ns);
     EXPECT_EQ(own(outcomes[0]), own(outcomes[1])) << n;
     EXPECT_EQ(doubted(outcomes[0]), doubted(outcomes[1])) << n;
@@ -182,11 +182,12 @@ TEST_F(OwnVoxels, BesideTheStepsAMapGivesWayToNoneAndToTheEnd) {
 }
 
 /// The boom comes to the voxels in which the hand is, and the hand leaves them.
-TEST_F(OwnVoxels, OfARobotOneLinkFollowsAnother) {
-  for (const bool are_links : {true, false}) {
+TEST_F(OwnVoxels, OfARobotOneLinkFollowsAnotherAndWhatItHoldsIt) {
+  enum How { LINKS, HOLDS, NEITHER };
+  for (const How how : {LINKS, HOLDS, NEITHER}) {
     Body hand = named("hand"), boom = named("boom");
     hand.own_voxels_m = boom.own_voxels_m = 0.05;
-    if (are_links) {
+    if (how == LINKS) {
       hand.link = "hand";
       boom.link = "boom";
     }
@@ -195,6 +196,7 @@ TEST_F(OwnVoxels, OfARobotOneLinkFollowsAnother) {
     MonitorOptions options = loose();
     options.detector.obstacle_expected = true;
     options.own_voxels_lag_s = 0;
+    if (how == HOLDS) options.held = {{{ExpectedPartner{0, {}, ""}, ExpectedPartner{1, {}, ""}}, ""}};
     monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{hand, boom});
     const auto feedBoth = [&](StampNs stamp_ns, double hand_z, double boom_z) {
       monitor_->push(1, sheet(stamp_ns, boom_z), NOW);
@@ -215,8 +217,8 @@ TEST_F(OwnVoxels, OfARobotOneLinkFollowsAnother) {
     feedBoth(500 * MS, 2, 0.62);
     map(450 * MS, slab(1) + voxelsOf(0.55));
     const Outcome outcome = feedBoth(600 * MS, 2, 0.62);
-    EXPECT_EQ(own(outcome), are_links ? 25u : 0u);
-    EXPECT_EQ(doubted(outcome), are_links ? 0u : 25u) << "what the hand brought may have stayed below the boom";
+    EXPECT_EQ(own(outcome), how == NEITHER ? 0u : 25u) << how;
+    EXPECT_EQ(doubted(outcome), how == NEITHER ? 25u : 0u) << "what the hand brought may have stayed below the boom";
   }
 }
 

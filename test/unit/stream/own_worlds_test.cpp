@@ -388,6 +388,35 @@ TEST_F(OwnWorlds, ATowelThatAGripperLaysKeepsItsOwn) {
   EXPECT_EQ(own(rests), lies.cells().size());
 }
 
+// A towel that lay for a while is carried away, and maps go on to show it where it lay, as something found or not. Once
+// they show that free it is carried back through its own trail.
+TEST_F(OwnWorlds, ALaidTowelGoesThroughItsOwnTrailOnceThatIsCleared) {
+  for (const bool finds : {true, false}) {
+    start();
+    const auto at = [](int k) { return Place{{0.001 + 0.05 * k, 0.051, 0.051}}; };
+    map({});
+    for (int k = 0; k < 10; ++k) {
+      go(at(0), far_);
+      map(at(0).cells());
+    }
+    ASSERT_TRUE(isClear(go(at(0), far_)));
+    for (int k = 1; k <= 6; ++k) {
+      go(at(k), far_);
+      map(at(0).cells() + at(k).cells(), nullptr, finds);
+    }
+    EXPECT_FALSE(isClear(go(at(0), far_))) << "no map has cleared it";
+    go(at(6), far_);
+    map(at(6).cells());
+    const StampNs cleared_ns = now_;
+    for (int k = 5; k >= 0; --k) {
+      const Outcome back = go(at(k), far_);
+      EXPECT_TRUE(isClear(back)) << finds << ", " << k << ": " << describe(assuranceOf(back));
+      map(at(k).cells());
+    }
+    EXPECT_LE(now_, cleared_ns + 3000 * MS);
+  }
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd

@@ -80,6 +80,7 @@ TEST_F(RobotPipeline, WhatTheHandHoldsIsExpectedUntilItOpens) {
   EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::EXPECTED);
   EXPECT_TRUE(says(driven_->outcome.expected, "mesh with palm"));
   MonitorPipeline& pipeline = driven_->pipeline;
+  EXPECT_EQ(pipeline.monitor().options().held.size(), 1u) << "they share own voxels as long";
   EXPECT_THROW(pipeline.setHold("mesh", "thumb", false), ParameterError);
   EXPECT_THROW(pipeline.setHold("cloth", "", false), ParameterError);
   pipeline.setPhase("");  // leaves it as it is
@@ -87,6 +88,7 @@ TEST_F(RobotPipeline, WhatTheHandHoldsIsExpectedUntilItOpens) {
   feed(1.2, 0.0995f);  // within the plate: it crosses all the time
   EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::NEW);
   EXPECT_TRUE(driven_->outcome.expected.empty());
+  EXPECT_TRUE(pipeline.monitor().options().held.empty());
   pipeline.setHold("", "", true);
   feed(1.3, 0.05f);
   EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::EXPECTED);
