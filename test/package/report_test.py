@@ -218,6 +218,8 @@ class ReportPageTest(FolderTestCase):
         before, data, after = re.split(r'(?<=const R = )(.*?)(?=;\n)', self.page.read_text(), maxsplit=1, flags=re.S)
         run_data = json.loads(data)
         usual = 2 * run_data['total']['p95_ms']
+        for step in run_data['steps']:  # of which a busy machine may have made some long
+            step['ms'] = min(step['ms'] or 0, run_data['total']['p95_ms'])
         run_data['steps'][30]['ms'] = 1000 * usual
         run_data['proof'].update(unproved='why not, ' * 200 + 'and what to do', proved=0)
         self.page = self.own / 'report.html'
