@@ -124,6 +124,18 @@ class Owned:
             found += [(points, points, surface) for _, points, surface in some]
         return found
 
+    def may_have_a_seam(self, name, begin, end):
+        """Was it perhaps not known where it was at some time in between? Then nobody knows of what appears anywhere whether it was there."""
+        track, w = self.world.tracks[name], self.world
+        clock = {f.stamp for f in getattr(w.tracks.get(w.clock_body), 'every', [])}
+        every = [place for place in self.every[name][-1] if not isinstance(track, placed.Rigid) or place[0] in clock]
+        first, last = (np.searchsorted([stamp for stamp, _, _ in every], t) for t in (begin, end))
+        some, most = every[max(0, first - 1):last + 1], w.params.get('max_vertex_step_m', 0.5) or np.inf
+        came = [f.stamp for f in track.every]
+        return track.moves and (last == len(every) or len(some) > 1000 or came != sorted(came) or any(
+            begin <= stamp <= end for stamp, _, _ in track.refused) or any(
+            b - a > NS // 2 or p.shape != q.shape or np.nanmax(touches.length(q - p)) > most for (a, p, _), (b, q, _) in zip(some, some[1:])))
+
     def reached(self, name, numbers, ways, back, reach, resolution, sure=False):
         """Which voxels come within reach; `sure`: only those that the monitor certainly finds."""
         found = np.zeros(len(numbers), bool)
@@ -164,7 +176,9 @@ class Owned:
             reach = {name: m.resolution if r == 'auto' else r for name, r in self.reach.items()}
             more, corners = max(reach.values()) + 2 * m.resolution, placed.carried(back, box)
             low, high = (np.floor(x / m.resolution).astype(int) + 32768 for x in (corners.min(0) - more, corners.max(0) + more))
-            fresh, gone = voxels(m.corners, m.sizes, low, high), remembered
+            since = (m if before is None else before).stamp - self.lag
+            anywhere = before is not None and any(self.may_have_a_seam(name, since, m.stamp) for name in self.every)
+            fresh, gone = voxels(m.corners, m.sizes, *((0, 65536) if anywhere else (low, high))), remembered
             if before is not None:
                 vanished = voxels(before.corners, before.sizes, low, high)
                 gone = np.concatenate([gone, vanished[~np.isin(vanished, np.concatenate([own, doubt]))]])
@@ -173,7 +187,7 @@ class Owned:
             lasts = ~shown(*m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
             own, doubt = own[shown(m.corners, m.sizes, own)], doubt[shown(m.corners, m.sizes, doubt)]
             for name in self.every:
-                ways = self.ways(name, (m if before is None else before).stamp - self.lag, m.stamp)
+                ways = self.ways(name, since, m.stamp)
                 near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]
                 is_known = before is not None and (not w.tracks[name].moves or self.since(name) <= m.stamp)
                 if is_known or self.trust:

@@ -40,6 +40,7 @@ class Sample:
     rotation: np.ndarray  # x, y, z, w
     static: bool
     came: int
+    sender: str = ''
 
     def usable(self):
         numbers = np.concatenate([self.translation, self.rotation])
@@ -72,23 +73,44 @@ def between(a, b, share):
 class Transforms:
     def __init__(self):
         self.samples, self.static, self.unusable = {}, {}, {}  # of each child frame
+        self.order, self.went_back = [], []  # child and sample, as they came; when a frame of a body came that was stamped before one that it had
         self.said = None  # only what came until then counts
 
-    def add(self, message, static, came):
+    def add(self, message, static, came, sender):
         for t in message.transforms:
             v, q = t.transform.translation, t.transform.rotation
             sample = Sample(t.header.stamp.to_nsec(), t.header.frame_id.lstrip('/'), np.array([v.x, v.y, v.z]),
-                            np.array([q.x, q.y, q.z, q.w]), static, came)
+                            np.array([q.x, q.y, q.z, q.w]), static, came, sender)
             child = t.child_frame_id.lstrip('/')
             kept = self.unusable
             if sample.usable() and child and sample.parent and child != sample.parent:
                 kept = self.static if static else self.samples
             kept.setdefault(child, []).append(sample)
+            self.order += [(child, sample)] * (kept is self.samples)
 
     def finish(self):
+        self.contradicted = list(self.contradictions())
         for samples in self.samples.values():
             samples.sort(key=lambda s: s.stamp)
         self.stamps = {child: [s.stamp for s in samples] for child, samples in self.samples.items()}
+
+    def contradictions(self):
+        """When samples came that contradict what their publisher sent: at a stamp of more than a second before, or elsewhere at one that it had."""
+        newest, sent = {}, {}
+        for child, s in self.order:
+            mine, last = sent.setdefault(child, {}), newest.get((child, s.sender), 0)
+            first = mine.setdefault(s.stamp, s)
+            elsewhere = first.sender == s.sender and s.stamp < last and (first.parent != s.parent or max(s.off(first)) > 1e-6)
+            if last > s.stamp + NS or elsewhere:
+                yield s.came
+                for key in [key for key in newest if key[1] == s.sender]:  # what it sent counts no more
+                    newest[key], sent[key[0]] = 0, {}
+            newest[child, s.sender] = max(s.stamp, newest.get((child, s.sender), 0))
+
+    def seen_ahead(self, said):
+        """How far ahead analyze_bag reads /tf: ten seconds, or up to a contradiction, whose turn comes early where the bodies' stamps went back."""
+        ends = (came for came in self.contradicted if said < came and not any(back <= said and came <= back + NS for back in self.went_back))
+        return min([10 * NS, *(came - 1 - said for came in ends)])
 
     def judge(self, said, ahead, begun):
         """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
