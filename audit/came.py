@@ -167,12 +167,9 @@ class Reader:
         unseen = ~np.isfinite(positions).all(1) | ~(np.isin(np.arange(len(positions)), surface.used) | again)
         return Frame(stamp, name, positions, surface, unseen, unchecked, came, number)
 
-    def topology(self):
-        said = self.settings.get('topology', {})
-        return {'source': said} if isinstance(said, str) else said
-
     def given(self, positions):
-        topology = self.topology()
+        topology = self.settings.get('topology', {})
+        topology = {'source': topology} if isinstance(topology, str) else topology
         if topology.get('source') == 'depth_image':
             raise NotCovered('a depth image as a body')
         if 'file' in topology:
@@ -225,13 +222,8 @@ class Reader:
             self.made = (key, Surface(len(points), faces), lost)
         return self.made[1], self.made[2]
 
-    def Marker(self, m):
-        return self.markers([m])
-
     def MarkerArray(self, m):
-        return self.markers(m.markers)
-
-    def markers(self, given):
+        given = getattr(m, 'markers', [m])
         marker = self.settings.get('marker', {})
         mine = [x for x in given if x.action == 0 and (x.type == 11 or x.type in (4, 5, 7, 8))
                 and marker.get('namespace', x.ns) == x.ns and marker.get('id', x.id) == x.id]
@@ -256,6 +248,8 @@ class Reader:
             return corners, self.reuse(('lines', len(corners), cells.tobytes()), lambda: Surface(len(corners), lines=cells)), 0
         faces, lost = fans(cells.tolist(), corners)
         return corners, self.reuse(('soup', faces.tobytes()), lambda: Surface(len(corners), faces)), lost
+
+    Marker = MarkerArray
 
     def ropes(self, markers):
         strips = [x for x in markers if x.type == 4 and len(x.points) > 1]
@@ -375,13 +369,8 @@ def read_ply(path):
 
     read = {}
     for name, count, properties in elements:
-        rows = []
-        for _ in range(count):
-            row = {}
-            for p in properties:
-                row[p[-1]] = [value(p[2]) for _ in range(int(value(p[1])))] if p[0] == 'list' else value(p[0])
-            rows.append(row)
-        read[name] = rows
+        one = lambda p: [value(p[2]) for _ in range(int(value(p[1])))] if p[0] == 'list' else value(p[0])
+        read[name] = [{p[-1]: one(p) for p in properties} for _ in range(count)]
     vertices = np.array([[r['x'], r['y'], r['z']] for r in read.get('vertex', [])]).reshape(-1, 3)
     polygons = [[int(i) for i in r.get('vertex_indices', r.get('vertex_index', []))] for r in read.get('face', [])]
     lines = [(int(r['vertex1']), int(r['vertex2'])) for r in read.get('edge', [])] if not polygons else []
@@ -393,6 +382,22 @@ def read_ply(path):
 # -- robots -------------------------------------------------------------------------------------------------------------
 
 
+def boxed(size):
+    """Corners and faces of a box around the origin."""
+    points = np.array([[x, y, z] for z in (-.5, .5) for y in (-.5, .5) for x in (-.5, .5)]) * size
+    return points, [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+
+
+def turned(radius, half):
+    """Of a cylinder around z, or of a sphere, which has no length: rings of 32 corners, from pole to pole, where they are one."""
+    rings = [(radius, -half), (radius, half)] if half else [(radius * np.sin(a), -radius * np.cos(a)) for a in np.linspace(0, np.pi, 17)[1:-1]]
+    turn = np.arange(32) * np.pi / 16
+    points = [np.stack([r * np.cos(turn), r * np.sin(turn), 0 * turn + z], 1) for r, z in [(0, -(half or radius)), *rings, (0, half or radius)]]
+    points, index = welded(np.concatenate(points))
+    return points, [[index[32 * k + n] for k, n in ((k, i), (k, (i + 1) % 32), (k + 1, (i + 1) % 32), (k + 1, i))]
+                    for k in range(len(rings) + 1) for i in range(32)]
+
+
 def links(path, files):
     """Each collision element of a URDF: link, positions, surface, lost. Of what is round a mesh that lies within it."""
     tree = xml.parse(path).getroot()
@@ -400,28 +405,13 @@ def links(path, files):
         for element in link.findall('collision'):
             shape = element.find('geometry')[0]
             numbers = lambda name, default='0 0 0', of=shape: [float(w) for w in of.get(name, default).split()]
-            if shape.tag == 'box':
-                points, lost = np.array([[x, y, z] for z in (-.5, .5) for y in (-.5, .5) for x in (-.5, .5)]) * numbers('size'), 0
-                faces = [f for a, b, c, d in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
-                         for f in ((a, b, c), (a, c, d))]
-                surface = Surface(8, np.array(faces))
-            elif shape.tag in ('cylinder', 'sphere'):
-                radius, lost = float(shape.get('radius')), 0
-                half = float(shape.get('length')) / 2 if shape.tag == 'cylinder' else 0
-                rings = [(radius, -half), (radius, half)] if half else [
-                    (radius * np.sin(a), -radius * np.cos(a)) for a in np.linspace(0, np.pi, 17)[1:-1]]
-                turn = np.arange(32) * np.pi / 16
-                points = np.concatenate([np.stack([r * np.cos(turn), r * np.sin(turn), 0 * turn + z], 1) for r, z in rings] + [
-                    [[0, 0, -(half or radius)], [0, 0, half or radius]]])
-                faces, top, i = [], 32 * len(rings), np.arange(32)
-                for k in range(len(rings) - 1):
-                    a, b, c, d = 32 * k + i, 32 * k + (i + 1) % 32, 32 * k + 32 + i, 32 * k + 32 + (i + 1) % 32
-                    faces += [np.stack([a, b, c], 1), np.stack([b, d, c], 1)]
-                faces += [np.stack([0 * i + top, (i + 1) % 32, i], 1), np.stack([0 * i + top + 1, top - 32 + i, top - 32 + (i + 1) % 32], 1)]
-                surface = Surface(len(points), np.concatenate(faces))
-            elif shape.tag == 'mesh':
+            if shape.tag == 'mesh':
                 points, surface, lost = files.mesh(shape.get('filename'))
                 points = points * numbers('scale', '1 1 1')
+            elif shape.tag in ('box', 'cylinder', 'sphere'):
+                points, polygons = boxed(numbers('size')) if shape.tag == 'box' else turned(float(shape.get('radius')), float(shape.get('length', 0)) / 2)
+                faces, lost = fans(polygons, points)
+                surface = Surface(len(points), faces)
             else:
                 raise NotCovered('a link of shape %s' % shape.tag)
             origin = element.find('origin')
@@ -453,14 +443,22 @@ class Map:
     rays: tuple = ((), ())  # of a cloud, where its sensor was, and the points
     free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
 
-    def boxes(self):
-        keys = self.corners.astype(float) - 32768
-        return keys * self.resolution, (keys + self.sizes[:, None]) * self.resolution
-
-    def without(self, boxes, carry):
-        """The map without the finest voxels whose centre, carried into the boxes' frame, lies in one of them."""
-        corners, sizes, kept = self.corners, self.sizes, []
+    def without(self, part):
+        """The map without a part of it: of leaves, corners and sizes, `part` says which it does not meet, and which lie in it. The others are split."""
+        corners, sizes, kept = self.corners, self.sizes, [(self.corners[:0], self.sizes[:0])]
         while len(sizes):
+            out, gone = part(corners, sizes)
+            kept.append((corners[out], sizes[out]))
+            split = ~out & ~gone & (sizes > 1)
+            half = sizes[split] // 2
+            corners = np.concatenate([corners[split] + half[:, None] * [i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
+            sizes = np.tile(half, 8)
+        corners, sizes = map(np.concatenate, zip(*kept))
+        return replace(self, corners=corners, sizes=sizes)
+
+    def boxed(self, boxes, carry):
+        """The part in the boxes: the finest voxels whose centre, carried into their frame, lies in one of them."""
+        def part(corners, sizes):
             middle = carry((corners - 32768 + sizes[:, None] / 2) * self.resolution)
             reach = ((sizes - 1) / 2 * self.resolution * 3 ** 0.5)[:, None]
             out, gone = np.ones(len(sizes), bool), np.zeros(len(sizes), bool)
@@ -468,12 +466,8 @@ class Map:
                 low, high = np.array(box[:3]) - 1e-9, np.array(box[3:]) + 1e-9
                 out &= ((middle + reach < low) | (middle - reach > high)).any(1)
                 gone |= ((middle - reach >= low) & (middle + reach <= high)).all(1)
-            kept.append((corners[out], sizes[out]))
-            split = ~out & ~gone & (sizes > 1)
-            half = sizes[split] // 2
-            corners = np.concatenate([corners[split] + half[:, None] * [i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
-            sizes = np.tile(half, 8)
-        return replace(self, corners=np.concatenate([c for c, _ in kept] or [corners]), sizes=np.concatenate([n for _, n in kept] or [sizes]))
+            return out, gone
+        return part
 
 
 def leaves_of(data, binary, bytes_a_node=4):

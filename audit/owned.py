@@ -49,16 +49,13 @@ def shown(corners, sizes, numbers):
 
 def less(map_, numbers):
     """The map without these voxels."""
-    if not len(numbers):
-        return map_
-    corners, sizes = map_.corners, map_.sizes
-    hit = np.zeros(len(sizes), bool)
-    for size in np.unique(sizes):
-        mine = sizes == size
-        hit[mine] = np.isin(packed(corners[mine]), packed(unpacked(numbers) // size * size))
-    rest = voxels(corners[hit], sizes[hit], 0, 65536)
-    rest = unpacked(rest[~np.isin(rest, numbers)])
-    return replace(map_, corners=np.concatenate([corners[~hit], rest]), sizes=np.append(sizes[~hit], np.ones(len(rest), int)))
+    def part(corners, sizes):
+        hit = np.zeros(len(sizes), bool)
+        for size in np.unique(sizes):
+            mine = sizes == size
+            hit[mine] = np.isin(packed(corners[mine]), packed(unpacked(numbers) // size * size))
+        return ~hit, hit & (sizes == 1)
+    return map_.without(part) if len(numbers) else map_
 
 
 def with_unknown(map_, box):
@@ -70,15 +67,15 @@ def with_unknown(map_, box):
 
 
 class Owned:
-    """reach: by name, how near a voxel is to be [m]; 'auto' for the edge of one."""
-
-    def __init__(self, world, reach, lag, trust):
-        self.world, self.reach, self.lag, self.trust = world, reach, int(lag * NS), trust
+    def __init__(self, world):
+        self.world, self.reach = world, world.owners()  # by name, how near a voxel is to be [m]; 'auto' for the edge of one
+        self.lag, self.trust = int(world.params.get('own_voxels_lag_s', 0.1) * NS), world.params.get('own_voxels_doubt') == 'trust'
+        self.clock = getattr(world.tracks.get(world.clock_body), 'every', [])
         self.of = {}  # by the map's number: what may be own, what may be in doubt
         statics = world.transforms.static.values()
         changes = {s.came for samples in statics for s in samples[1:] if max(s.off(samples[0])) > 1e-6}
         self.moments = [*sorted(came - 1 for came in changes), EVER]  # a static frame has another place at each
-        self.every = {name: [list(self.places(name, moment)) for moment in self.moments] for name in reach}
+        self.every = {name: [list(self.places(name, moment)) for moment in self.moments] for name in self.reach}
         if any(any(some) for some in self.every.values()):
             (self.follow_clouds if world.clouds else self.follow)()
 
@@ -103,7 +100,7 @@ class Owned:
         frames = [(f.stamp, f.frame, f.positions, f.surface) for f in track.every]
         if isinstance(track, placed.Rigid):
             # A step takes it where tf has it at the clock's frames, and looks at tf's samples in between.
-            stamps = {f.stamp for f in getattr(w.tracks.get(w.clock_body), 'every', [])}
+            stamps = {f.stamp for f in self.clock}
             stamps |= {sample.stamp for samples in w.transforms.samples.values() for sample in samples}
             frames = [(stamp, track.mesh.frame, track.mesh.positions, track.mesh.surface) for stamp in stamps]
         for stamp, frame, points, surface in sorted(frames, key=lambda f: f[0]):
@@ -127,7 +124,7 @@ class Owned:
     def may_have_a_seam(self, name, begin, end):
         """Was it perhaps not known where it was at some time in between? Then nobody knows of what appears anywhere whether it was there."""
         track, w = self.world.tracks[name], self.world
-        clock = {f.stamp for f in getattr(w.tracks.get(w.clock_body), 'every', [])}
+        clock = {f.stamp for f in self.clock}
         every = [place for place in self.every[name][-1] if not isinstance(track, placed.Rigid) or place[0] in clock]
         first, last = (np.searchsorted([stamp for stamp, _, _ in every], t) for t in (begin, end))
         some, most = every[max(0, first - 1):last + 1], w.params.get('max_vertex_step_m', 0.5) or np.inf
@@ -189,7 +186,8 @@ class Owned:
             for name in self.every:
                 ways = self.ways(name, since, m.stamp)
                 near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]
-                is_known = before is not None and (not w.tracks[name].moves or self.since(name) <= m.stamp)
+                first = min((f.stamp for f in w.tracks[name].every or self.clock), default=0)  # from then on its place is known
+                is_known = before is not None and (not w.tracks[name].moves or first <= m.stamp)
                 if is_known or self.trust:
                     own = np.union1d(own, near)
                 else:
@@ -203,21 +201,17 @@ class Owned:
 
     def follow_clouds(self):
         """What no body ever reached until then is none's own, however often it was seen free before."""
-        seen, ever, begin = NONE, np.zeros(0, bool), 0
+        seen, ever, begin, before, doubt = NONE, np.zeros(0, bool), 0, NONE, NONE
         for m in self.world.maps:
-            back = self.back(m, lambda cloud: cloud.stamp)
-            fresh = np.setdiff1d(packed(m.corners), seen)
+            back, filled = self.back(m, lambda cloud: cloud.stamp), packed(m.corners)
+            if begin and any(self.may_have_a_seam(name, begin - self.lag, m.stamp) for name in self.every):
+                doubt = np.union1d(doubt, np.setdiff1d(filled, before))
+            fresh = np.setdiff1d(filled, seen)
             asked = [(np.concatenate([seen, fresh]), begin - self.lag), (fresh, 0)]
             ever = np.append(ever, np.zeros(len(fresh), bool))
             for numbers, since in asked:
                 for name, r in self.reach.items():
                     ways = self.ways(name, since, m.stamp)
                     ever[len(ever) - len(numbers):] |= self.reached(name, numbers, ways, back, m.resolution if r == 'auto' else r, m.resolution)
-            seen, begin = asked[0][0], m.stamp
-            self.of[m.number] = seen[ever], NONE
-
-    def since(self, name):
-        """From when on its place is known; of a rigid body from the clock's first frame on."""
-        w = self.world
-        frames = getattr(w.tracks[name], 'every', None) or getattr(w.tracks.get(w.clock_body), 'every', [])
-        return min((f.stamp for f in frames), default=0)
+            seen, begin, before = asked[0][0], m.stamp, filled
+            self.of[m.number] = seen[ever], doubt

@@ -42,10 +42,6 @@ class Sample:
     came: int
     sender: str = ''
 
-    def usable(self):
-        numbers = np.concatenate([self.translation, self.rotation])
-        return bool(np.isfinite(numbers).all()) and abs(np.linalg.norm(self.rotation) - 1) <= 0.005
-
     def off(self, other):
         """How far the two are apart: metres, and the angle."""
         p, q = (s.rotation / np.linalg.norm(s.rotation) for s in (self, other))
@@ -82,8 +78,8 @@ class Transforms:
             sample = Sample(t.header.stamp.to_nsec(), t.header.frame_id.lstrip('/'), np.array([v.x, v.y, v.z]),
                             np.array([q.x, q.y, q.z, q.w]), static, came, sender)
             child = t.child_frame_id.lstrip('/')
-            kept = self.unusable
-            if sample.usable() and child and sample.parent and child != sample.parent:
+            kept, named = self.unusable, child and sample.parent and child != sample.parent
+            if named and np.isfinite(sample.translation).all() and abs(np.linalg.norm(sample.rotation) - 1) <= 0.005:
                 kept = self.static if static else self.samples
             kept.setdefault(child, []).append(sample)
             self.order += [(child, sample)] * (kept is self.samples)
@@ -115,10 +111,6 @@ class Transforms:
     def judge(self, said, ahead, begun):
         """What is judged was said then, of a step whose first frame had come at `begun`, by somebody who knew /tf so far ahead."""
         self.said, self.read, self.begun, self.memory = said, said + ahead, begun, {}
-
-    def have_statics_from_start(self):
-        for samples in self.static.values():
-            samples[0].came = 0
 
     def known(self, samples):
         return [s for s in samples if s.came <= (self.said if s.static else self.read)]
@@ -335,7 +327,7 @@ class Rigid(Stream):
         return [self.mesh]
 
     def exact(self, start, end):
-        return self.mesh.frame == self.fixed
+        return self.carrier(start, end) == self.fixed
 
     def loose_at_end(self, start, end):
         return False
@@ -381,14 +373,13 @@ class Held(Stream):
         frame = self.around(start, end)[0]
         return carried(self.transforms.pose(frame.frame, self.fixed, frame.stamp), frame.positions)
 
-    def exact(self, start, end):
-        return self.around(start, end)[0].frame == self.fixed
+    exact = Rigid.exact
 
     def turns(self, start, end):
         return False
 
     def loose(self, start, end):
-        return self.carrier(start, end) != self.fixed
+        return not self.exact(start, end)
 
 
 def pieces(tracks, start, end, tolerance):
