@@ -1,4 +1,4 @@
-// What surrounds a step's contacts: the map, the bodies, and what rigid ones sweep.
+// What surrounds a step's contacts: the map and the bodies.
 #include "output/marker_drawing.h"
 
 #include <algorithm>
@@ -136,43 +136,12 @@ void addMeshes(MarkerDrawing& drawing) {
   }
 }
 
-/// Each vertex by the separation along the mean of its faces' normals, as far as it takes for each of these faces.
-Positions grown(const Topology& topology, const Positions& at, double by_m) {
-  Positions normals(at.size(), Vec3::Zero()), out = at;
-  double volume = 0;
-  for (const Face& f : topology.faces()) {
-    const Vec3 area = (at[f[1]] - at[f[0]]).cross(at[f[2]] - at[f[0]]);
-    volume += at[f[0]].dot(area);
-    for (const Index v : f) normals[v] += area.normalized();
-  }
-  if (topology.isClosed() && volume < 0) by_m = -by_m;  // its faces look inwards
-  for (std::size_t v = 0; v < at.size(); ++v) out[v] += by_m * normals[v].stableNormalized();
-  return out;
-}
-
-/// Of rigid bodies: what must not come nearer than their separation, roughly.
-void addPadding(MarkerDrawing& drawing) {
-  for (const Body& body : drawing.outcome.step->bodies) {
-    const bool placed = std::all_of(body.t1->begin(), body.t1->end(), [](const Vec3& p) { return p.allFinite(); });
-    if (!body.rigid || !placed || !(body.minimum_separation_m > 0)) continue;
-    Marker padding = drawing.make("padding/" + body.name, Marker::TRIANGLE_LIST, 1.0);
-    padding.color = color(1, 0.7, 0.2, 0.25);
-    const Positions at = grown(*body.topology, *body.t1, body.minimum_separation_m);
-    for (const Face& face : body.topology->faces()) {
-      for (const Index v : face) padding.points.push_back(point(at[v]));
-    }
-    drawing.add(std::move(padding));
-  }
-}
-
 }  // namespace
 
 void addScene(MarkerDrawing& drawing) {
   addObstacle(drawing);
   addOwn(drawing);
-  if (!drawing.config.mesh) return;
-  addMeshes(drawing);
-  addPadding(drawing);
+  if (drawing.config.mesh) addMeshes(drawing);
 }
 
 }  // namespace dccd
