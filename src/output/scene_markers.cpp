@@ -95,36 +95,23 @@ void addTriangle(const Vec3& a, const Vec3& b, const Vec3& c, Marker& marker) {
   marker.colors.insert(marker.colors.end(), 3, shaded(a, b, c));
 }
 
-/// A rope's edge, for a line has no light and shade.
-void addTube(const Vec3& a, const Vec3& b, double radius_m, Marker& marker) {
-  if (a == b) return;
-  constexpr int SIDES = 6;
-  const Vec3 along = (b - a).normalized(), u = along.unitOrthogonal(), v = along.cross(u);
-  const auto around = [&](int k) {
-    return Vec3(radius_m * (std::cos(2 * M_PI * k / SIDES) * u + std::sin(2 * M_PI * k / SIDES) * v));
-  };
-  for (int k = 0; k < SIDES; ++k) {
-    const Vec3 p = around(k), q = around(k + 1);
-    addTriangle(a + p, a + q, b + q, marker);
-    addTriangle(a + p, b + q, b + p, marker);
-  }
-}
-
 void addMeshes(MarkerDrawing& drawing) {
   for (std::size_t b = 0; b < drawing.bodies.size(); ++b) {
     const Topology& topology = *drawing.outcome.step->bodies[b].topology;
     const Positions& at = *drawing.outcome.step->bodies[b].t1;
     const std::string& name = drawing.bodies[b].name;
-    Marker marker = drawing.make("mesh/" + name, Marker::TRIANGLE_LIST, 1.0);
+    const bool has_faces = topology.hasFaces();
+    Marker marker = drawing.make("mesh/" + name, has_faces ? Marker::TRIANGLE_LIST : Marker::LINE_LIST,
+                                 has_faces ? 1.0 : 0.8 * drawing.config.point_size_m);
+    marker.color = color(0.36, 0.58, 1, BODY_ALPHA);
     for (const auto& f : topology.faces()) {
       if (at[f[0]].allFinite() && at[f[1]].allFinite() && at[f[2]].allFinite()) {
         addTriangle(at[f[0]], at[f[1]], at[f[2]], marker);
       }
     }
     for (const auto& e : topology.edges()) {
-      if (topology.hasFaces()) break;
-      const double radius_m = 0.4 * drawing.config.point_size_m;
-      if (at[e[0]].allFinite() && at[e[1]].allFinite()) addTube(at[e[0]], at[e[1]], radius_m, marker);
+      if (has_faces || !at[e[0]].allFinite() || !at[e[1]].allFinite()) continue;
+      for (const Index v : e) marker.points.push_back(point(at[v]));
     }
     if (marker.points.empty()) continue;
     drawing.add(std::move(marker));
