@@ -97,17 +97,14 @@ def page_row(database, one):
         cell('<br>'.join(map(html.escape, (one['said'] or '').split('\n'))))]))
 
 
-def page(title, lead, head, body):
-    text = PAGE.read_text()
-    for mark, value in (('@title@', title), ('@lead@', lead), ('@head@', head), ('@rows@', body)):
-        text = text.replace(mark, value, 1)
-    return text
-
-
 def fleet_page(database):
     recordings = database.execute('SELECT * FROM recordings ORDER BY name').fetchall()
     head = ''.join('<th>%s%s</th>' % (name, ' [%s]' % unit if unit else '') for name, unit in COLUMNS)
-    return page('Recordings', summary(database), head, '\n'.join(page_row(database, one) for one in recordings))
+    text = PAGE.read_text()
+    for mark, value in (('@lead@', summary(database)), ('@head@', head),
+                        ('@rows@', '\n'.join(page_row(database, one) for one in recordings))):
+        text = text.replace(mark, value, 1)
+    return text
 
 
 def summary(database):

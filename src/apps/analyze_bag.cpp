@@ -253,7 +253,7 @@ int main(int argc, char** argv) {
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::Range(0.0, 3600.0));
   app.add_flag("--accuracy-study", a.study,
-               "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
+               "run the bag with fewer frames, vertices and voxels, other rungs and noise, and say what each "
                "does to first contacts");
   app.add_flag("--quiet", a.quiet, "no progress");
   app.add_flag("--list-pieces", a.pieces, "only say, as JSON, which of the bags are pieces of one run")

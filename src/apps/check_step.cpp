@@ -31,8 +31,7 @@ struct Arguments {
   std::vector<std::string> frames;
   std::string topology, contacts, stats;
   std::string accuracy = "exact", simd = "auto";
-  double tolerance_m = AccuracyOptions().tolerance_m, budget_ms = 0;
-  int toc_bits = AccuracyOptions().toc_bits, threads = 1, repeat = 1;
+  int threads = 1, repeat = 1;
   bool no_start_state = false, earliest_only = false, forget = false;
 };
 
@@ -48,10 +47,6 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--contacts", a.contacts, "write the contacts as CSV, of several steps with the step first, from 0");
   app.add_option("--stats", a.stats, "write pairs and milliseconds per stage as JSON");
   app.add_option("--accuracy", a.accuracy, "conservative or exact")->capture_default_str();
-  app.add_option("--tolerance", a.tolerance_m, "of conservative [m]")->capture_default_str();
-  app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
-      ->capture_default_str();
-  app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
   app.add_option("--repeat", a.repeat, "run the step this often for the times")
       ->check(CLI::Range(1, 1000000))
@@ -138,10 +133,7 @@ Options optionsOf(const Arguments& a, bool is_sequence) {
   Options options;
   options.keep_bounds = is_sequence && !a.forget;  // else the same step again and again
   options.accuracy.rung = accuracyFromString(a.accuracy.c_str());
-  options.accuracy.tolerance_m = a.tolerance_m;
-  options.accuracy.toc_bits = a.toc_bits;
   options.num_threads = a.threads;
-  options.step_budget_ms = a.budget_ms;
   options.earliest_only = a.earliest_only;
   options.check_start_state = !a.no_start_state;
   return options;

@@ -18,7 +18,6 @@ struct Arguments {
   std::string file, simd = "auto";
   std::vector<std::string> pairs, bodies;
   int threads = 1;
-  std::size_t show = 10;
 };
 
 Arguments parse(int argc, char** argv, CLI::App& app) {
@@ -35,7 +34,6 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto; the answer does not depend on it")->capture_default_str();
-  app.add_option("--show", a.show, "contacts to list")->capture_default_str();
   requireDecimalNumbers(app);
   app.parse(argc, argv);
   return a;
@@ -120,17 +118,18 @@ void describe(const StepRecording& r) {
   if (r.step.map.surface) std::cout << "  map: " << r.step.map.surface->leafCount() << " occupied leaves\n";
 }
 
-void show(const Outcome& answer, const StepRecording& recording, std::size_t most) {
+void show(const Outcome& answer, const StepRecording& recording) {
+  constexpr std::size_t MOST = 10;
   std::cout << "replayed: " << toString(answer.status) << ", " << answer.contacts.size() << " contacts, start state "
             << toString(answer.start_state) << '\n'
             << std::setprecision(17);
-  for (std::size_t i = 0; i < std::min(most, answer.contacts.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(MOST, answer.contacts.size()); ++i) {
     const Contact& c = answer.contacts[i];
     std::cout << "  " << describeContact(c, recording.step.bodies) << "  toc [" << c.toc_lower << ", " << c.toc_upper
               << "]" << (c.certainty == Certainty::UNDECIDED ? " undecided" : "") << (c.initial ? " initial" : "")
               << (c.leaving ? " leaving" : "") << '\n';
   }
-  if (answer.contacts.size() > most) std::cout << "  ...\n";
+  if (answer.contacts.size() > MOST) std::cout << "  ...\n";
 }
 
 int replay(const Arguments& a) {
@@ -138,7 +137,7 @@ int replay(const Arguments& a) {
   const StepRecording recording = readRecordingFile(a.file);
   describe(recording);
   const StepReplay result = replayStep(recording, a.threads);
-  show(result.answer, recording, a.show);
+  show(result.answer, recording);
   if (!a.pairs.empty()) trace(a, recording);
   if (!recording.has_answer || !recording.answer.answered) {
     std::cout << "nothing to compare with: the recorded step had no answer"

@@ -35,7 +35,7 @@ constexpr std::pair<const char*, const char*> GONE[] = {
     {"markers/normal_length_m", "a normal is five points long; write markers/point_size_m"},
     {"markers/line_width_m", "a line is a fifth of a point wide; write markers/point_size_m"},
     {"markers/max_contacts", "the first 2000 are shown, as RViz can hold them; remove it"},
-    {"markers/swept", "markers/mesh shows bodies and their padding; remove it"},
+    {"markers/swept", "markers/mesh shows bodies; remove it"},
     {"clearance/tolerance_m", "distances are known to 1e-4 m; remove it, or ask the library or Python"},
     {"record_folder", "steps are recorded to deformable_ccd in $ROS_HOME; set ROS_HOME of the node"},
     {"robot/scale", "scale single links by robot/links, or widen all of them by robot/padding_m"},

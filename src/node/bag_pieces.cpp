@@ -43,15 +43,10 @@ std::optional<PieceName> pieceNameOf(const std::string& bag) {
   return name;
 }
 
-double secondsOf(const BagSpan& span) { return (span.end - span.begin).toSec(); }
-
-/// Whether the second bag goes on where the first one ends, both with messages; `empty`: so many pieces without any lie
-/// between them. One of these lasts as long as the others do, and at both sides of them it may have been silent, too.
-bool goesOn(const BagSpan& first, const BagSpan& second, bool dated, std::size_t empty = 0) {
+/// Whether the second bag goes on where the first one ends, both with messages.
+bool goesOn(const BagSpan& first, const BagSpan& second, bool dated) {
   const double pause_s = (second.begin - first.end).toSec();
-  const double silent_s =
-      empty == 0 ? 0 : static_cast<double>(empty + 2) * std::max(secondsOf(first), secondsOf(second));
-  return pause_s >= -OUT_OF_ORDER_S && pause_s <= silent_s + (dated ? PAUSE_OF_DATED_S : PAUSE_S);
+  return pause_s >= -OUT_OF_ORDER_S && pause_s <= (dated ? PAUSE_OF_DATED_S : PAUSE_S);
 }
 
 /// The piece before, of a name without a date, lies in the same folder.
@@ -77,22 +72,18 @@ constexpr double UNRELATED_S = std::numeric_limits<double>::infinity();
 /// Pieces that go on from each other.
 struct Recording {
   std::vector<std::size_t> places;
-  unsigned long last_number = 0, last_with_messages = 0;
+  unsigned long last_number = 0;
   BagSpan span;  // of that one
 
   void add(const Piece& piece) {
     places.push_back(piece.place);
     last_number = piece.name.number;
-    if (piece.span.isEmpty()) return;
-    last_with_messages = last_number;
     span = piece.span;
   }
-  /// UNRELATED_S: the piece does not go on from here. Where no times tell, numbers do, as well as any pause would.
+  /// UNRELATED_S: the piece does not go on from here.
   double pauseBefore(const Piece& piece) const {
     if (piece.name.number != last_number + 1) return UNRELATED_S;
-    if (piece.span.isEmpty() || span.isEmpty()) return std::numeric_limits<double>::max();
-    const bool goes_on = goesOn(span, piece.span, piece.name.dated, last_number - last_with_messages);
-    return goes_on ? (piece.span.begin - span.end).toSec() : UNRELATED_S;
+    return goesOn(span, piece.span, piece.name.dated) ? (piece.span.begin - span.end).toSec() : UNRELATED_S;
   }
 };
 
@@ -104,7 +95,7 @@ std::vector<std::vector<std::string>> groupedByRun(const std::vector<std::string
   for (std::size_t i = 0; i < bags.size(); ++i) {
     const std::optional<PieceName> name = pieceNameOf(bags[i]);
     const std::optional<BagSpan> span = name ? spanOf(bags[i]) : std::nullopt;
-    if (span) {
+    if (span && !span->isEmpty()) {
       of_name[name->run].push_back({i, *name, *span});
     } else {
       groups.push_back({i});

@@ -99,9 +99,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     waiting.mesh.arrival_ns = message.arrival_ns;
     waiting.mesh.number = came_[body] - passed_over_[body].messages;  // which are no frames
     waiting.mesh.thinned = message.thinned;
-    if (topology_filter_) {
-      waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
-    }
+    if (topology_filter_) waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology);
   } catch (const PassedOver& other) {
     return passed_over_[body].add(other);
   } catch (const MeshError& error) {

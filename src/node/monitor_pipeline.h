@@ -48,10 +48,9 @@ struct LoadedMap : ObstacleMap {
   std::map<std::string, std::uint64_t> placed_by{};
 };
 
-/// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
-/// are those of the frame, in its own frame of reference.
-using TopologyFilter = std::function<std::shared_ptr<const Topology>(
-    std::size_t body, const std::shared_ptr<const Topology>& topology, const Positions& positions)>;
+/// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one.
+using TopologyFilter =
+    std::function<std::shared_ptr<const Topology>(std::size_t body, const std::shared_ptr<const Topology>& topology)>;
 
 class MonitorPipeline {
  public:

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "base/contact_fields.h"
-#include "base/contact_geometries.h"
 #include "dccd/monitor_extras.h"
 #include "output/clearance_messages.h"
 #include "output/patch_messages.h"
@@ -171,15 +170,11 @@ const deformable_ccd::ContactArray& fillContactArray(const Outcome& outcome, con
   out.bodies.clear();
   for (const Body& body : bodies) out.bodies.push_back(body.name);
   resizeKept(out.contacts, outcome.contacts.size());
-  std::array<ContactGeometry, 256> geometry;  // of some at a time, which stay in the first cache
-  for (std::size_t first = 0, last = 0; first < out.contacts.size(); first = last) {
-    last = std::min(first + geometry.size(), out.contacts.size());
-    contactGeometries(outcome, first, last, geometry.data());
-    for (std::size_t i = first; i < last; ++i) {
-      const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
-      const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
-      fillContact(outcome, outcome.contacts[i], geometry[i - first], patch, out.contacts[i]);
-    }
+  for (std::size_t i = 0; i < out.contacts.size(); ++i) {
+    const Contact& contact = outcome.contacts[i];
+    const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
+    const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
+    fillContact(outcome, contact, contactGeometry(outcome, contact), patch, out.contacts[i]);
   }
   resizeKept(out.intersections, outcome.intersections.size());
   for (std::size_t i = 0; i < outcome.intersections.size(); ++i) {

@@ -1,4 +1,4 @@
-// What surrounds a step's contacts: the map, the bodies, and what rigid ones sweep.
+// What surrounds a step's contacts: the map and the bodies.
 #include "output/marker_drawing.h"
 
 #include <algorithm>
@@ -95,36 +95,23 @@ void addTriangle(const Vec3& a, const Vec3& b, const Vec3& c, Marker& marker) {
   marker.colors.insert(marker.colors.end(), 3, shaded(a, b, c));
 }
 
-/// A rope's edge, for a line has no light and shade.
-void addTube(const Vec3& a, const Vec3& b, double radius_m, Marker& marker) {
-  if (a == b) return;
-  constexpr int SIDES = 6;
-  const Vec3 along = (b - a).normalized(), u = along.unitOrthogonal(), v = along.cross(u);
-  const auto around = [&](int k) {
-    return Vec3(radius_m * (std::cos(2 * M_PI * k / SIDES) * u + std::sin(2 * M_PI * k / SIDES) * v));
-  };
-  for (int k = 0; k < SIDES; ++k) {
-    const Vec3 p = around(k), q = around(k + 1);
-    addTriangle(a + p, a + q, b + q, marker);
-    addTriangle(a + p, b + q, b + p, marker);
-  }
-}
-
 void addMeshes(MarkerDrawing& drawing) {
   for (std::size_t b = 0; b < drawing.bodies.size(); ++b) {
     const Topology& topology = *drawing.outcome.step->bodies[b].topology;
     const Positions& at = *drawing.outcome.step->bodies[b].t1;
     const std::string& name = drawing.bodies[b].name;
-    Marker marker = drawing.make("mesh/" + name, Marker::TRIANGLE_LIST, 1.0);
+    const bool has_faces = topology.hasFaces();
+    Marker marker = drawing.make("mesh/" + name, has_faces ? Marker::TRIANGLE_LIST : Marker::LINE_LIST,
+                                 has_faces ? 1.0 : 0.8 * drawing.config.point_size_m);
+    marker.color = color(0.36, 0.58, 1, BODY_ALPHA);
     for (const auto& f : topology.faces()) {
       if (at[f[0]].allFinite() && at[f[1]].allFinite() && at[f[2]].allFinite()) {
         addTriangle(at[f[0]], at[f[1]], at[f[2]], marker);
       }
     }
     for (const auto& e : topology.edges()) {
-      if (topology.hasFaces()) break;
-      const double radius_m = 0.4 * drawing.config.point_size_m;
-      if (at[e[0]].allFinite() && at[e[1]].allFinite()) addTube(at[e[0]], at[e[1]], radius_m, marker);
+      if (has_faces || !at[e[0]].allFinite() || !at[e[1]].allFinite()) continue;
+      for (const Index v : e) marker.points.push_back(point(at[v]));
     }
     if (marker.points.empty()) continue;
     drawing.add(std::move(marker));
@@ -136,43 +123,12 @@ void addMeshes(MarkerDrawing& drawing) {
   }
 }
 
-/// Each vertex by the separation along the mean of its faces' normals, as far as it takes for each of these faces.
-Positions grown(const Topology& topology, const Positions& at, double by_m) {
-  Positions normals(at.size(), Vec3::Zero()), out = at;
-  double volume = 0;
-  for (const Face& f : topology.faces()) {
-    const Vec3 area = (at[f[1]] - at[f[0]]).cross(at[f[2]] - at[f[0]]);
-    volume += at[f[0]].dot(area);
-    for (const Index v : f) normals[v] += area.normalized();
-  }
-  if (topology.isClosed() && volume < 0) by_m = -by_m;  // its faces look inwards
-  for (std::size_t v = 0; v < at.size(); ++v) out[v] += by_m * normals[v].stableNormalized();
-  return out;
-}
-
-/// Of rigid bodies: what must not come nearer than their separation, roughly.
-void addPadding(MarkerDrawing& drawing) {
-  for (const Body& body : drawing.outcome.step->bodies) {
-    const bool placed = std::all_of(body.t1->begin(), body.t1->end(), [](const Vec3& p) { return p.allFinite(); });
-    if (!body.rigid || !placed || !(body.minimum_separation_m > 0)) continue;
-    Marker padding = drawing.make("padding/" + body.name, Marker::TRIANGLE_LIST, 1.0);
-    padding.color = color(1, 0.7, 0.2, 0.25);
-    const Positions at = grown(*body.topology, *body.t1, body.minimum_separation_m);
-    for (const Face& face : body.topology->faces()) {
-      for (const Index v : face) padding.points.push_back(point(at[v]));
-    }
-    drawing.add(std::move(padding));
-  }
-}
-
 }  // namespace
 
 void addScene(MarkerDrawing& drawing) {
   addObstacle(drawing);
   addOwn(drawing);
-  if (!drawing.config.mesh) return;
-  addMeshes(drawing);
-  addPadding(drawing);
+  if (drawing.config.mesh) addMeshes(drawing);
 }
 
 }  // namespace dccd

@@ -34,8 +34,6 @@ void forFields(const StudyRow& row, Visit visit) {
   visit("patches_parted", row.errors.parted);
   errors("vertices", row.errors.vertices);
   visit("pairs_share", row.errors.pairs_share);
-  visit("cut_steps", row.cut_steps);
-  visit("bound", row.bound);
 }
 
 /// "8", "0.35": two digits are all that a time has.
@@ -56,16 +54,13 @@ std::string lateAndEarly(const FirstErrors& errors) {
 
 }  // namespace
 
-void AccuracyStudy::add(const std::string& varied, const std::string& setting, const RunRecord& run, bool timed) {
+void AccuracyStudy::add(const std::string& varied, const std::string& setting, const RunRecord& run) {
   StudyRow row;
   row.varied = varied;
   row.setting = setting;
-  row.timed = timed;
   row.steps = run.steps;
   row.ms_per_s = run.msPerSecond();
   row.errors = errorsOf(run, reference_);
-  row.cut_steps = run.bounds.size();
-  row.bound = quantile(run.bounds, 0.5);
   rows_.push_back(std::move(row));
 }
 
@@ -90,7 +85,7 @@ std::string AccuracyStudy::sentence() const {
   const double enough_ms = WORTH_IT * quantile(referenceTimes(), 0);
   const StudyRow* best = nullptr;
   for (const StudyRow& row : rows_) {
-    if (row.timed || row.varied == REFERENCE || row.ms_per_s > enough_ms) continue;
+    if (row.varied == REFERENCE || row.ms_per_s > enough_ms) continue;
     if (!best || std::make_pair(wrong(row), row.ms_per_s) < std::make_pair(wrong(*best), best->ms_per_s)) best = &row;
   }
   if (!best) return "Nothing that was tried saves a tenth of the time.";
@@ -137,7 +132,6 @@ nlohmann::json AccuracyStudy::json() const {
   for (const StudyRow& row : rows_) {
     nlohmann::json j;
     forFields(row, [&](const char* name, const auto& value) { j[name] = value; });
-    j["timed"] = row.timed;
     j["share_of_time"] = shareOfTime(row);
     rows.push_back(std::move(j));
   }

@@ -17,12 +17,9 @@ constexpr const char* REFERENCE = "reference";
 struct StudyRow {
   std::string varied;   ///< "frames"
   std::string setting;  ///< "every 2nd"
-  bool timed = false;   ///< a limit of time: its answers depend on the machine
   std::size_t steps = 0;
   double ms_per_s = 0;
   RunErrors errors;
-  std::size_t cut_steps = 0;  ///< in which pairs were left out
-  double bound = 0;           ///< median over these: what was left out touches no earlier [share of the step]
 };
 
 class AccuracyStudy {
@@ -30,7 +27,7 @@ class AccuracyStudy {
   explicit AccuracyStudy(RunRecord reference) : reference_(std::move(reference)) {}
 
   const RunRecord& reference() const { return reference_; }
-  void add(const std::string& varied, const std::string& setting, const RunRecord& run, bool timed = false);
+  void add(const std::string& varied, const std::string& setting, const RunRecord& run);
   const std::vector<StudyRow>& rows() const { return rows_; }
 
   /// Of what saves a tenth of the time and more, that which gets the fewest patches wrong, and of these the fastest.

@@ -135,11 +135,9 @@ void RunRecorder::add(const Outcome& outcome) {
   if (!outcome.answered) return;
   ++record_.steps;
   record_.ms += outcome.stats.total_ms;
-  record_.step_ms.push_back(outcome.stats.total_ms);
   record_.duration_s += outcome.duration_s();
   record_.end_ns = outcome.stamp_ns;
   record_.pairs += outcome.stats[Stage::ELEMENTARY].in + outcome.stats[Stage::OBSTACLE].in;
-  if (!outcome.complete) record_.bounds.push_back(std::min(outcome.unchecked_toc_lower, 1.0));
   addMeshes(outcome);
   for (const Contact& contact : outcome.contacts) {
     const TimeSpan span{stampAt(outcome, contact.toc_lower, std::floor),

@@ -45,8 +45,6 @@ struct RunRecord {
   std::size_t steps = 0;
   double ms = 0, duration_s = 0;  ///< of the answered steps
   std::uint64_t pairs = 0;        ///< that came to the elementary test, with bodies or the map
-  std::vector<double> bounds;  ///< of each step that was cut: what was left out touches no earlier [share of the step]
-  std::vector<double> step_ms;
 
   double msPerSecond() const { return duration_s > 0 ? ms / duration_s : 0; }
 };

@@ -200,6 +200,6 @@ else { const rows = R.study.rows, percent = v => `${(100 * v).toFixed(v < 0.0995
   frontPlot('study_plot', rows.map(r => ({ x: r.ms_per_s, y: r.patches_missed < r.patches_touched ? r.patches_p95_ms : null, name: r.setting, group: r.varied, missed: r.patches_missed, invented: r.patches_invented })),
     'milliseconds of computing a second of recording', 'first contact of a patch, 95 % within [ms]', 1e-6);
   table('study', ['varied', '', 'ms a second', 'time', 'patches', 'missed', 'invented', 'median ms', '95 %', 'early', 'late', 'vertices', 'missed', 'invented', 'median ms', '95 %', 'early', 'late',
-    'pairs tested', 'steps cut', 'bound of the rest'], rows.map(r => [r.varied, r.setting, short(r.ms_per_s), percent(r.share_of_time), ...['patches', 'vertices'].flatMap(of =>
+    'pairs tested'], rows.map(r => [r.varied, r.setting, short(r.ms_per_s), percent(r.share_of_time), ...['patches', 'vertices'].flatMap(of =>
       ['touched', 'missed', 'invented', 'median_ms', 'p95_ms', 'early_ms', 'late_ms'].map(what => r[of + '_' + what])),
-      percent(r.pairs_share), r.cut_steps, r.cut_steps ? r.bound : null])); }
+      percent(r.pairs_share)])); }

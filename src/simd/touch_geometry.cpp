@@ -66,7 +66,6 @@ HWY_INLINE void store(const Vectors& v, double (&x)[3][TOUCHES], size_t i) {
 }
 
 struct Segments {
-  V u, v;
   Vectors on_first, on_second;
 };
 HWY_INLINE Segments closestOnSegments(const Vectors& a0, const Vectors& a1, const Vectors& b0, const Vectors& b1) {
@@ -74,27 +73,10 @@ HWY_INLINE Segments closestOnSegments(const Vectors& a0, const Vectors& a1, cons
   const V aa = dot(da, da), bb = dot(db, db), ab = dot(da, db);
   const V denominator = hn::Sub(hn::Mul(aa, bb), hn::Mul(ab, ab));
   const V a_between = dot(da, between), b_between = dot(db, between);
-  Segments out;
-  out.u = unit(hn::Div(hn::Sub(hn::Mul(ab, b_between), hn::Mul(bb, a_between)), denominator));
-  out.v = unit(hn::Div(hn::Add(hn::Mul(ab, out.u), b_between), bb));
-  out.u = unit(hn::Div(hn::Sub(hn::Mul(ab, out.v), a_between), aa));
-  out.on_first = a0 + out.u * da;
-  out.on_second = b0 + out.v * db;
-  return out;
-}
-
-/// Of the projection onto the triangle's plane, clamped into the triangle.
-HWY_INLINE Vectors barycentric(const Vectors& p, const Vectors& f0, const Vectors& f1, const Vectors& f2) {
-  const Vectors e1 = f1 - f0, e2 = f2 - f0, d = p - f0;
-  const V d11 = dot(e1, e1), d12 = dot(e1, e2), d22 = dot(e2, e2), dp1 = dot(d, e1), dp2 = dot(d, e2);
-  const V denominator = hn::Sub(hn::Mul(d11, d22), hn::Mul(d12, d12));
-  V w1 = hn::Div(hn::Sub(hn::Mul(d22, dp1), hn::Mul(d12, dp2)), denominator);
-  V w2 = hn::Div(hn::Sub(hn::Mul(d11, dp2), hn::Mul(d12, dp1)), denominator);
-  const hn::Mask<D> finite = hn::And(isFinite(w1), isFinite(w2));
-  w1 = clamp(hn::IfThenElse(finite, w1, number(1.0 / 3)), number(1));
-  const V rest = hn::Sub(number(1), w1);
-  w2 = clamp(hn::IfThenElse(finite, w2, number(1.0 / 3)), rest);
-  return {hn::Sub(rest, w2), w1, w2};
+  V u = unit(hn::Div(hn::Sub(hn::Mul(ab, b_between), hn::Mul(bb, a_between)), denominator));
+  const V v = unit(hn::Div(hn::Add(hn::Mul(ab, u), b_between), bb));
+  u = unit(hn::Div(hn::Sub(hn::Mul(ab, v), a_between), aa));
+  return {a0 + u * da, b0 + v * db};
 }
 
 /// At toc 0 the position itself.
@@ -126,52 +108,6 @@ void Places(bool edge_edge, size_t count, TouchBlock& block) {
   }
 }
 
-void Geometry(bool edge_edge, size_t count, TouchBlock& block) {
-  const D d;
-  const Vectors up{hn::Zero(d), hn::Zero(d), number(1)};
-  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const V toc = hn::LoadU(d, block.toc + i), rest = hn::Sub(number(1), toc);
-    Vectors at[4], motion[4];
-    for (int k = 0; k < 4; ++k) {
-      const Vectors from = load(block.x[0][k], i), to = load(block.x[1][k], i);
-      at[k] = rest * from + toc * to;
-      motion[k] = to - from;
-    }
-    V weights[4];
-    Vectors on_first, on_second, first_motion, second_motion, across;
-    if (edge_edge) {
-      const Segments closest = closestOnSegments(at[0], at[1], at[2], at[3]);
-      weights[0] = hn::Sub(number(1), closest.u);
-      weights[1] = closest.u;
-      weights[2] = hn::Sub(number(1), closest.v);
-      weights[3] = closest.v;
-      on_first = closest.on_first;
-      on_second = closest.on_second;
-      first_motion = weights[0] * motion[0] + weights[1] * motion[1];
-      second_motion = weights[2] * motion[2] + weights[3] * motion[3];
-      across = cross(at[1] - at[0], at[3] - at[2]);
-    } else {
-      const Vectors w = barycentric(at[0], at[1], at[2], at[3]);
-      weights[0] = number(1);
-      weights[1] = w.x;
-      weights[2] = w.y;
-      weights[3] = w.z;
-      on_first = at[0];
-      on_second = w.x * at[1] + w.y * at[2] + w.z * at[3];
-      first_motion = motion[0];
-      second_motion = w.x * motion[1] + w.y * motion[2] + w.z * motion[3];
-      across = cross(at[2] - at[1], at[3] - at[1]);
-    }
-    store(number(0.5) * (on_first + on_second), block.point, i);
-    const Vectors relative = first_motion - second_motion;
-    Vectors normal = unitOr(across, unitOr(-relative, up));
-    normal = select(hn::Gt(dot(normal, relative), hn::Zero(d)), -normal, normal);
-    store(normal, block.normal, i);
-    for (int k = 0; k < 4; ++k) hn::StoreU(weights[k], d, block.weights[k] + i);
-    hn::StoreU(hn::Neg(dot(normal, relative)), d, block.approach_speed + i);
-  }
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
 }  // namespace dccd
@@ -182,13 +118,9 @@ namespace dccd {
 namespace simd {
 
 HWY_EXPORT(Places);
-HWY_EXPORT(Geometry);
 
 void touchPlaces(bool edge_edge, std::size_t count, TouchBlock& block) {
   HWY_DYNAMIC_DISPATCH(Places)(edge_edge, count, block);
-}
-void touchGeometry(bool edge_edge, std::size_t count, TouchBlock& block) {
-  HWY_DYNAMIC_DISPATCH(Geometry)(edge_edge, count, block);
 }
 
 }  // namespace simd

@@ -1,10 +1,13 @@
 """analyze_fleet: many bags come to one database and page, whatever happens to the jobs."""
+import contextlib
 import csv
 import html
 import os
 import pathlib
+import re
 import shutil
 import signal
+import sqlite3
 import subprocess
 import tempfile
 import time
@@ -122,7 +125,7 @@ class FleetTest(FolderTestCase):
         folder = self.folder / name
         folder.mkdir()
         shutil.copy(str(FLEET / 'analyze_fleet'), str(folder / 'analyze_fleet'))
-        for file in ('Snakefile', 'profile', 'fleet_compare.py', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
+        for file in ('Snakefile', 'profile', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
             (folder / file).symlink_to(FLEET / file)
         (folder / 'analyze_bag').write_text('#!/bin/bash\n%s\nexec %s "$@"\n' % (script, TOOLS / 'analyze_bag'))
         (folder / 'analyze_bag').chmod(0o755)
@@ -282,28 +285,18 @@ class FleetTest(FolderTestCase):
         self.assertEqual((good, again), ('0 0', '0 0'))
         self.assertEqual(before, after, 'nothing good is overwritten')
 
-    def test_comparison(self):
-        one, other, params = (self.folder / name for name in ('one', 'two', 'compared.yaml'))
-        for out, gap in ((one, '0.25'), (other, '0.0')):
-            params.write_text(self.params.read_text() + '\npatch_gap_s: %s\n' % gap)
-            fleet(self.first, '--params', params, '--out', out)
-        same = fleet('--compare', one, '--out', one)
-        self.assertEqual((same.returncode, same.stdout.count('new patch')), (0, 0), same.stdout)
-        changed = fleet('--compare', one, '--out', other)
-        patches = [rows_of(out, 'SELECT body_0, body_1, first_s, last_s FROM patches') for out in (one, other)]
-        self.assertEqual(changed.returncode, 2 if sorted(patches[0]) != sorted(patches[1]) else 0, changed.stdout)
+    def test_the_page_says_how_to_compare_results(self):
+        one, masked, params = (self.folder / name for name in ('one', 'masked', 'compared.yaml'))
+        fleet(self.first, '--params', self.params, '--out', one)
         text = self.params.read_text().replace('{topic: /cloth}', '{topic: /cloth, vertex_mask: %s}' % list(range(0, 1089, 2)))
         self.assertIn('vertex_mask', text)
         params.write_text(text)
-        masked = self.folder / 'masked'
         fleet(self.first, '--params', params, '--out', masked)
-        changed = fleet('--compare', one, '--out', masked)
-        self.assertEqual(changed.returncode, 2, changed.stdout)
-        self.assertRegex(changed.stdout, r'first: contacts: \d+ new, [1-9]\d* gone, \d+ moved')
-        self.assertIn('1 of 1 recordings changed', (masked / 'compare.html').read_text())
-        nothing = fleet('--compare', self.folder / 'nowhere', '--out', one)
-        self.assertEqual(nothing.returncode, 1)
-        self.assertIn('holds no results of a fleet', nothing.stderr)
+        attach, query = re.search(r'(ATTACH [^;]*);\n(SELECT [^;]*);', (CHECKOUT / 'doc/fleet.md').read_text()).groups()
+        for other, names in ((one, []), (masked, ['first'])):
+            with contextlib.closing(sqlite3.connect(one / 'fleet.sqlite')) as database:
+                database.execute(attach.replace('OTHER_RESULTS', str(other)))
+                self.assertEqual([row[0] for row in database.execute(query)], names)
 
 
 if __name__ == '__main__':

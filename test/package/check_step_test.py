@@ -146,9 +146,6 @@ class CheckStepTest(FolderTestCase):
         self.assertNotIn('nothing touches', self.said)
         self.refused('at the start was not checked', sheet(0) + through, sheet(0) + through, '--no-start-state')
 
-    def test_a_budget_that_was_cut(self):
-        self.refused('the step budget ran out', sheet(0) + sheet(0.1), sheet(0) + sheet(-0.1), '--budget', '0.001')
-
     def obj(self, points, polygons, ends=None):
         """The step of an OBJ from the points to the ends."""
         faces = ''.join('f ' + ' '.join(str(v + 1) for v in polygon) + '\n' for polygon in polygons)

@@ -11,7 +11,6 @@
 
 #include "apps/analyze_bag/thinned_mesh.h"
 #include "base/accuracy.h"
-#include "stream/quantile.h"
 
 namespace dccd {
 namespace {
@@ -20,13 +19,11 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t FRAMES[] = {2, 4, 8}, ROWS[] = {2, 4}, VOXELS[] = {2, 4, 8};
 constexpr double NOISE_M[] = {0.001, 0.003};
-constexpr int BUDGETS[] = {1, 2, 4};  // parts of what 95 % of the reference's steps keep to
 
 struct Variant {
   std::string varied, setting;
   MonitorConfig config;
   Variation variation;
-  bool timed = false;
 };
 
 std::string ordinal(std::size_t n) { return std::to_string(n) + (n == 2 ? "nd" : n == 3 ? "rd" : "th"); }
@@ -138,13 +135,6 @@ std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& refere
     }
     one.config.monitor.detector.accuracy.rung = Accuracy::CONSERVATIVE;
   }
-  for (const int part : BUDGETS) {
-    const std::string ms = text(quantile(reference.step_ms, 0.95) / part);
-    if (!(std::stod(ms) > 0)) continue;
-    Variant& one = add("step budget", ms + " ms");
-    one.config.monitor.detector.step_budget_ms = std::stod(ms);
-    one.timed = true;
-  }
   return variants;
 }
 
@@ -186,21 +176,21 @@ class StudyRunner {
 
 AccuracyStudy runStudy(const std::vector<std::string>& bags, const MonitorConfig& config,
                        const BagReplayOptions& options) {
-  Variant whole{REFERENCE, "", unlimited(config), {}, false};
+  Variant whole{REFERENCE, "", unlimited(config), {}};
   Options& detector = whole.config.monitor.detector;
   detector.accuracy = finest(config);
   detector.patches = true;
   detector.suppress_initial = false;
   whole.setting = nameOf(detector.accuracy);
   StudyRunner runner(bags, options);
-  constexpr std::size_t ABOUT = 20;  // how many runs there are is known once the reference is
+  constexpr std::size_t ABOUT = 16;  // how many runs there are is known once the reference is
   runner.run(whole, ABOUT);          // warms up: the first run of all is the slowest, whatever its setting
   AccuracyStudy study(runner.run(whole, ABOUT));
   study.add(whole.varied, whole.setting, study.reference());
   const std::vector<Variant> variants = coarserThings(whole, study.reference());
   for (std::size_t i = 0; i < variants.size(); ++i) {
     const Variant& one = variants[i];
-    study.add(one.varied, one.setting, runner.run(one, variants.size() - 1 - i), one.timed);
+    study.add(one.varied, one.setting, runner.run(one, variants.size() - 1 - i));
   }
   return study;
 }

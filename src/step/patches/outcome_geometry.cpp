@@ -4,10 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "base/contact_geometries.h"
+#include "dccd/outcome.h"
 #include "step/pairs/closest_points.h"
 #include "step/parts.h"
-#include "step/patches/touch_lanes.h"
 
 namespace dccd {
 
@@ -137,20 +136,6 @@ ContactGeometry contactGeometry(const Outcome& outcome, const Contact& contact) 
   ContactGeometry geometry = contactGeometry(contact.kind, pair, part.toc);
   geometry.approach_speed *= static_cast<double>(part.parts);
   return geometry;
-}
-
-void contactGeometries(const Outcome& outcome, std::size_t first, std::size_t last, ContactGeometry* out) {
-  const auto use = [&](std::size_t c, std::size_t count, const simd::TouchBlock& block) {
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      ContactGeometry& one = out[c + lane - first];
-      one.point = laneOf(block.point, lane);
-      one.normal = laneOf(block.normal, lane);
-      for (std::size_t k = 0; k < one.weights.size(); ++k) one.weights[k] = block.weights[k][lane];
-      one.approach_speed = block.approach_speed[lane];
-    }
-  };
-  const auto other = [&](std::size_t c) { out[c - first] = contactGeometry(outcome, outcome.contacts[c]); };
-  inLanes<false>(outcome, first, last, simd::touchGeometry, use, other);
 }
 
 Vec3 vertexAtContact(const Outcome& outcome, const Contact& contact, int i) {

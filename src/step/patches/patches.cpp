@@ -182,7 +182,7 @@ void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
   const auto other = [&](std::size_t c) {
     addPlaces(c, c + 1, [&](std::size_t i) { return placeOf(outcome, outcome.contacts[i]); });
   };
-  inLanes<true>(outcome, first, std::min(last, contacts_), simd::touchPlaces, use, other);
+  inLanes(outcome, first, std::min(last, contacts_), use, other);
   forParts(std::max(first, contacts_), last, [&](std::size_t from, std::size_t to, Part& part) {
     const StartIntersection* const crossings = outcome.intersections.data() - contacts_;
     addCrossings(outcome, crossings + from, crossings + to, part);

@@ -13,13 +13,11 @@ namespace dccd {
 
 constexpr std::size_t CONTACTS_AHEAD = 16;  ///< whose vertices are fetched from memory
 
-/// Of outcome.contacts from first to last, which are in canonical order: kernel(edge_edge, count, block) takes a block
-/// of lanes, then use(contact, count, block) with the first of them; other(contact) those with the map and, where the
-/// step is cut into parts, all. contact: its place in the list. PLACES: the kernel is simd::touchPlaces, which is
-/// spared the ends that it does not use.
-template <bool PLACES, class Kernel, class Use, class Other>
-void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const Kernel& kernel, const Use& use,
-             const Other& other) {
+/// Of outcome.contacts from first to last, which are in canonical order: use(contact, count, block) gets touchPlaces()
+/// of a block of lanes, other(contact) those with the map and, where the step is cut into parts, all. contact: its
+/// place in the list.
+template <class Use, class Other>
+void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const Use& use, const Other& other) {
   simd::TouchBlock block;
   const Contact* const contacts = outcome.contacts.data();
   // Of one kind, and of the same two bodies.
@@ -43,10 +41,10 @@ void inLanes(const Outcome& outcome, std::size_t first, std::size_t last, const 
             __builtin_prefetch(t1[k] + ahead.vertex[k]);
           }
           std::memcpy(block.x[0][k][lane], t0[k] + contact.vertex[k], sizeof(Vec3));
-          if (!PLACES || edges || k == 0) std::memcpy(block.x[1][k][lane], t1[k] + contact.vertex[k], sizeof(Vec3));
+          if (edges || k == 0) std::memcpy(block.x[1][k][lane], t1[k] + contact.vertex[k], sizeof(Vec3));
         }
       }
-      kernel(edges, count, block);
+      simd::touchPlaces(edges, count, block);
       use(first, count, block);
     }
   };

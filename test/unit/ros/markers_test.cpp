@@ -51,46 +51,6 @@ std::size_t pointsIn(const visualization_msgs::MarkerArray& array, const std::st
   return points;
 }
 
-Box boundsOf(const visualization_msgs::MarkerArray& array, const std::string& ns) {
-  Box box;
-  for (const Marker& marker : array.markers) {
-    for (const auto& p : marker.points) {
-      if (marker.ns != ns) continue;
-      box.min = box.min.cwiseMin(Vec3(p.x, p.y, p.z));
-      box.max = box.max.cwiseMax(Vec3(p.x, p.y, p.z));
-    }
-  }
-  return box;
-}
-
-// A tetrahedron that moves by 1 along x, with a separation of 0.5, its faces outwards or inwards.
-TEST(Markers, WhatIsWatchedOfARigidBodyIsShownOnRequest) {
-  for (const bool inwards : {false, true}) {
-    Outcome outcome = overABlock(1, 0);
-    auto step = std::make_shared<Step>(*outcome.step);
-    Body& body = step->bodies[1];
-    body.name = "palm";
-    body.rigid = true;
-    body.minimum_separation_m = 0.5;
-    std::vector<Face> faces{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-    for (Face& face : faces) {
-      if (inwards) std::swap(face[0], face[1]);
-    }
-    body.topology = share(Topology::fromTriangles(4, faces));
-    body.t0 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
-    body.t1 = share(Positions{{1, 0, 0}, {2, 0, 0}, {1, 1, 0}, {1, 0, 1}});
-    outcome.step = step;
-    MarkerConfig config;
-    EXPECT_EQ(pointsIn(toMarkers(outcome, step->bodies, config, "world"), "padding/palm"), 0u) << "off by default";
-    config.mesh = true;
-    const auto markers = toMarkers(outcome, step->bodies, config, "world");
-    EXPECT_EQ(pointsIn(markers, "padding/palm"), 12u);
-    EXPECT_LT(boundsOf(markers, "padding/palm").min.x(), 1);
-    EXPECT_GT(boundsOf(markers, "padding/palm").max.x(), 2.3) << "its corner points along x";
-    for (const Marker& marker : markers.markers) EXPECT_EQ(marker.ns.find("padding/body"), std::string::npos);
-  }
-}
-
 TEST(Markers, TheShortestSegmentOfTwoPartnersIsRedWhenNearAndGreenWhenFar) {
   Outcome outcome = overABlock(1, 0);
   std::vector<Body> bodies = twoBodies();

@@ -7,7 +7,6 @@
 #include <map>
 #include <utility>
 
-#include "base/contact_geometries.h"
 #include "oracle/oracle.h"
 #include "support/patch_oracle.h"
 #include "support/shapes.h"
