@@ -29,6 +29,7 @@ void OwnVoxelFinder::forget() {
   past_.clear();
   unseen_.clear();
   growth_.clear();
+  entered_.clear();
   remembered_.clear();
   seen_.clear();
   seen_alone_.clear();
@@ -194,6 +195,36 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
   seen_alone_ = std::move(look.seen_alone);
 }
 
+/// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
+/// met voxels that were own before and so did not appear.
+void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody>& bodies,
+                                 const std::vector<BodyWay>& ways) {
+  std::vector<std::uint64_t> own;
+  std::vector<OccupiedLeaf> from;
+  for (const auto& [key, voxel] : stated_) {
+    if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
+    if (voxel.shown && voxel.state == VoxelState::DOUBT && voxel.grew) from.push_back({voxel.key, 1});
+  }
+  StampNs free_ns = 0;  // it is no matter when
+  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
+    if (cube.near.empty()) from.push_back(cube.leaf);
+  }
+  double reach_m = 0;
+  for (const TrackedBody& body : bodies) reach_m = std::max(reach_m, body.reach_m);
+  const double resolution_m = look.map.surface->resolution();
+  entered_.clear();
+  std::unordered_set<std::uint64_t> left(own.begin(), own.end());
+  for (double deep_m = -resolution_m; deep_m < reach_m && !from.empty(); deep_m += resolution_m) {
+    std::vector<OccupiedLeaf> next;
+    const auto enter = [&](std::uint64_t key) {
+      if (left.erase(key) > 0 && entered_.insert(key).second) next.push_back({unpacked(key), 1});
+      return false;
+    };
+    for (const OccupiedLeaf& one : from) anyAround(one.min, enter);
+    from = std::move(next);
+  }
+}
+
 /// Which of what the map before left out is UNKNOWN: a body was within reach of it at that look, and already at the
 /// last one that is a gap ago. What nobody looks at for no longer than that is free.
 std::vector<OccupiedLeaf> OwnVoxelFinder::unknownOf(std::vector<OccupiedLeaf> left_out, const Look& look) const {
@@ -282,6 +313,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (const ReachedCube& cube : look.cubes) follow(cube, look);
   remembered_ = std::move(look.hidden);
   stateWhatAppeared(look, bodies, ways);
+  listEntered(look, bodies, ways);
   unseen_.keep();
   if (before_ && look.is_gap) gap_ = gapBefore(map);
   const auto isDoubted = [](const auto& one) { return one.second.state != VoxelState::OWN; };
