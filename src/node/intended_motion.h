@@ -53,7 +53,7 @@ class IntendedMotion {
 
  private:
   static constexpr std::size_t MOST_WAITING = 1000;  // motions that begin later
-  struct Segment {  // from point to point
+  struct Segment {                                   // from point to point
     double begin_s = 0, end_s = 0;
     std::vector<std::array<double, 6>> joints;  // Bernstein's, by joint
   };

@@ -193,6 +193,7 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
     stated_[key] = voxel;
   }
   seen_alone_ = std::move(look.seen_alone);
+  listEntered(look, bodies, ways);
 }
 
 /// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
@@ -313,7 +314,6 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (const ReachedCube& cube : look.cubes) follow(cube, look);
   remembered_ = std::move(look.hidden);
   stateWhatAppeared(look, bodies, ways);
-  listEntered(look, bodies, ways);
   unseen_.keep();
   if (before_ && look.is_gap) gap_ = gapBefore(map);
   const auto isDoubted = [](const auto& one) { return one.second.state != VoxelState::OWN; };
