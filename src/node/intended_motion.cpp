@@ -10,7 +10,11 @@
 namespace dccd {
 namespace {
 
+using trajectory_msgs::JointTrajectoryPoint;
+using Quintic = std::array<double, 6>;
+
 constexpr std::size_t MOST_PIECES = 64;  // of a stretch without a kink
+constexpr double SHORTEST_S = 1e-6;      // between two points: a jump in less than stamps tell apart has no speed
 
 template <class... Parts>
 std::string clause(const Parts&... parts) {
@@ -32,21 +36,32 @@ Eigen::Isometry3d screw(const Vec3& linear, const Vec3& angular, double time_s) 
   return moved;
 }
 
-double valueOf(const std::array<double, 4>& b, double u) {
-  const double v = 1 - u;
-  return v * v * v * b[0] + 3 * v * v * u * b[1] + 3 * v * u * u * b[2] + u * u * u * b[3];
+/// The way of a joint that is at a and b at two points, h seconds apart, as joint_trajectory_controller takes it: a
+/// quintic where both have speeds and accelerations, a cubic where both have speeds, else straight. All are quintics.
+Quintic quinticOf(const JointTrajectoryPoint& from, const JointTrajectoryPoint& to, std::size_t j, double h) {
+  const double a = from.positions[j], b = to.positions[j];
+  const bool has_speeds = !from.velocities.empty() && !to.velocities.empty();
+  const double v = h * (has_speeds ? from.velocities[j] : (b - a) / h), w = has_speeds ? h * to.velocities[j] : v;
+  const bool is_quintic = has_speeds && !from.accelerations.empty() && !to.accelerations.empty();
+  const double c = is_quintic ? h * h * from.accelerations[j] : 6 * (b - a) - 4 * v - 2 * w,
+               d = is_quintic ? h * h * to.accelerations[j] : 6 * (a - b) + 2 * v + 4 * w;
+  return {a, a + v / 5, a + 2 * v / 5 + c / 20, b - 2 * w / 5 + d / 20, b - w / 5, b};
+}
+
+double valueOf(Quintic b, double u) {
+  for (std::size_t most = b.size() - 1; most > 0; --most)
+    for (std::size_t i = 0; i < most; ++i) b[i] = (1 - u) * b[i] + u * b[i + 1];
+  return b[0];
 }
 
 /// The coefficients of a derivative bound it.
-JointPace paceOf(const std::array<double, 4>& b, double lasts_s) {
+JointPace paceOf(const Quintic& b, double lasts_s) {
   JointPace pace;
-  std::array<double, 3> speed;
-  for (std::size_t i = 0; i < 3; ++i) {
-    speed[i] = 3 * (b[i + 1] - b[i]) / lasts_s;
-    pace.speed = std::max(pace.speed, std::abs(speed[i]));
+  for (std::size_t i = 0; i < 5; ++i) pace.speed = std::max(pace.speed, std::abs(5 * (b[i + 1] - b[i]) / lasts_s));
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double bend = 20 * (b[i + 2] - 2 * b[i + 1] + b[i]);
+    pace.acceleration = std::max(pace.acceleration, std::abs(bend / lasts_s / lasts_s));
   }
-  for (std::size_t i = 0; i < 2; ++i)
-    pace.acceleration = std::max(pace.acceleration, std::abs(2 * (speed[i + 1] - speed[i]) / lasts_s));
   return pace;
 }
 
@@ -76,10 +91,10 @@ std::string IntendedMotion::segmentsOf(const trajectory_msgs::JointTrajectory& m
     return clause("points has ", message.points.size(), " of the two or more that it needs");
   double last_s = 0;
   for (std::size_t p = 0; p < message.points.size(); ++p) {
-    const trajectory_msgs::JointTrajectoryPoint& point = message.points[p];
+    const JointTrajectoryPoint& point = message.points[p];
     const double time_s = point.time_from_start.toSec();
     if (p == 0 && time_s != 0) return clause("points[0]/time_from_start is ", time_s, " s; it must be 0");
-    if (p > 0 && !(time_s > last_s))
+    if (p > 0 && !(time_s - last_s >= SHORTEST_S))
       return clause("points[", p, "]/time_from_start is ", time_s, " s, after ", last_s, " s");
     last_s = time_s;
     const auto problem = [&](const std::vector<double>& values, const char* field) {
@@ -91,16 +106,13 @@ std::string IntendedMotion::segmentsOf(const trajectory_msgs::JointTrajectory& m
     };
     std::string what = problem(point.positions, "positions");
     if (what.empty() && !point.velocities.empty()) what = problem(point.velocities, "velocities");
+    if (what.empty() && !point.accelerations.empty()) what = problem(point.accelerations, "accelerations");
     if (!what.empty()) return what;
     if (p == 0) continue;
-    const trajectory_msgs::JointTrajectoryPoint& before = message.points[p - 1];
+    const JointTrajectoryPoint& before = message.points[p - 1];
     Segment segment{before.time_from_start.toSec(), time_s, {}};
-    const bool is_cubic = !before.velocities.empty() && !point.velocities.empty();
-    for (std::size_t j = 0; j < names.size(); ++j) {
-      const double a = before.positions[j], b = point.positions[j], third_s = (time_s - segment.begin_s) / 3;
-      segment.joints.push_back({a, is_cubic ? a + third_s * before.velocities[j] : a + (b - a) / 3,
-                                is_cubic ? b - third_s * point.velocities[j] : b - (b - a) / 3, b});
-    }
+    for (std::size_t j = 0; j < names.size(); ++j)
+      segment.joints.push_back(quinticOf(before, point, j, time_s - segment.begin_s));
     motion.segments.push_back(std::move(segment));
   }
   motion.duration_s = last_s;

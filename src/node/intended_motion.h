@@ -53,10 +53,9 @@ class IntendedMotion {
 
  private:
   static constexpr std::size_t MOST_WAITING = 1000;  // motions that begin later
-  /// A joint between two points: a cubic by positions and speeds at both, or straight where the points have no speeds.
-  struct Segment {
+  struct Segment {                                   // from point to point
     double begin_s = 0, end_s = 0;
-    std::vector<std::array<double, 4>> joints;  // Bernstein's, by joint
+    std::vector<std::array<double, 6>> joints;  // Bernstein's, by joint
   };
   struct Motion {
     StampNs begin_ns = 0;

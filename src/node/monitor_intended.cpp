@@ -93,7 +93,7 @@ deformable_ccd::WouldTouch::Response MonitorPipeline::wouldTouch(const trajector
   answer.assumed.push_back(assumedOf(*answered_, path));
   answer.first = first.free_s;
   answer.verdict = first.body && !first.unknown.empty() ? answer.NOT_PROVED : first.body ? answer.TOUCHES : answer.FREE;
-  answer.reason = "nothing touches on all of it";
+  answer.reason = "on all of it nothing touches that is not expected";
   if (!first.body) return answer;
   putNames(*first.body, answered_->step->bodies, answer.bodies);
   std::tie(answer.point.x, answer.point.y, answer.point.z) =

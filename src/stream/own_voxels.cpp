@@ -29,6 +29,7 @@ void OwnVoxelFinder::forget() {
   past_.clear();
   unseen_.clear();
   growth_.clear();
+  entered_.clear();
   remembered_.clear();
   seen_.clear();
   seen_alone_.clear();
@@ -192,6 +193,37 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
     stated_[key] = voxel;
   }
   seen_alone_ = std::move(look.seen_alone);
+  listEntered(look, bodies, ways);
+}
+
+/// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
+/// met voxels that were own before and so did not appear.
+void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody>& bodies,
+                                 const std::vector<BodyWay>& ways) {
+  std::vector<std::uint64_t> own;
+  std::vector<OccupiedLeaf> from;
+  for (const auto& [key, voxel] : stated_) {
+    if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
+    if (voxel.shown && voxel.state == VoxelState::DOUBT && voxel.grew) from.push_back({voxel.key, 1});
+  }
+  StampNs free_ns = 0;  // it is no matter when
+  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
+    if (cube.near.empty()) from.push_back(cube.leaf);
+  }
+  double reach_m = 0;
+  for (const TrackedBody& body : bodies) reach_m = std::max(reach_m, body.reach_m);
+  const double resolution_m = look.map.surface->resolution();
+  entered_.clear();
+  std::unordered_set<std::uint64_t> left(own.begin(), own.end());
+  for (double deep_m = -resolution_m; deep_m < reach_m && !from.empty(); deep_m += resolution_m) {
+    std::vector<OccupiedLeaf> next;
+    const auto enter = [&](std::uint64_t key) {
+      if (left.erase(key) > 0 && entered_.insert(key).second) next.push_back({unpacked(key), 1});
+      return false;
+    };
+    for (const OccupiedLeaf& one : from) anyAround(one.min, enter);
+    from = std::move(next);
+  }
 }
 
 /// Which of what the map before left out is UNKNOWN: a body was within reach of it at that look, and already at the

@@ -65,20 +65,10 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   const double resolution_m = map.surface->resolution();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
   const VoxelTree& sure = trusted ? VoxelSurface::Impl::of(*trusted).tree : nothing;
-  const auto isGrown = [](const auto& one) {
-    return one.second.grew && one.second.shown && one.second.state == VoxelState::DOUBT;
-  };
-  const bool some_grew = std::any_of(stated_.begin(), stated_.end(), isGrown);
-  const auto isBesideGrown = [&](const VoxelKey& key) {
-    return some_grew && anyAround(key, [&](std::uint64_t beside) {
-             const auto found = stated_.find(beside);
-             return found != stated_.end() && isGrown(*found);
-           });
-  };
   std::vector<OwnVoxel> voxels;
   for (const auto& [key, voxel] : stated_) {
     if (!voxel.shown) continue;
-    const bool is_own = voxel.state == VoxelState::OWN && !isBesideGrown(voxel.key);
+    const bool is_own = voxel.state == VoxelState::OWN && entered_.count(key) == 0;
     voxels.push_back({voxel.key, *voxel.owners.begin(), !is_own});
   }
   std::sort(voxels.begin(), voxels.end(), [](const OwnVoxel& a, const OwnVoxel& b) { return a.key < b.key; });

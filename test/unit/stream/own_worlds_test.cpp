@@ -308,6 +308,27 @@ TEST_F(OwnWorlds, AHandInTheClothsOwnLayerIsNotTheCloths) {
   }
 }
 
+// Where a hand comes from above, own voxels end at the cloth's reach: none appears between the two.
+TEST_F(OwnWorlds, AHandThatEntersOwnVoxelsIsNotTheCloths) {
+  const Place rests{{0.101, 0.051, 0.051}};
+  const Cells layer = rests.cells(), thick = layer + Place{{0.101, 0.051, 0.071}}.cells();
+  for (const auto& [reach_m, seen] : {std::pair{0.005, layer}, std::pair{ONE_VOXEL, thick}}) {
+    start(reach_m);
+    map({});
+    go(rests, far_);
+    map(seen);
+    ASSERT_TRUE(isClear(go(rests, far_)));
+    for (double z = 0.201; z > 0.03; z -= 0.02) {
+      map(seen + cellsOf({0.141, 0.091, z}, {0.179, 0.129, 0.29}));
+      const bool is_clear = isClear(go(rests, far_));
+      if (z > 0.11) EXPECT_TRUE(is_clear) << reach_m << ", from " << z;
+      if (z < 0.05) EXPECT_FALSE(is_clear) << reach_m << ", from " << z;
+    }
+    map(seen);
+    EXPECT_TRUE(isClear(go(rests, far_))) << reach_m << ", gone";
+  }
+}
+
 // A cup is seen below a cloth that sinks, too seldom for an obstacle while the cloth is out of reach: once it may be a
 // sensor's noise, twice it is there. A doubt of the map's maker, so that only its own octree tells it.
 TEST_F(OwnWorlds, WhatWasSeenTwiceWithNobodyNearIsNotTheCloths) {

@@ -258,6 +258,10 @@ TEST(IntendedMotion, WhatIsWrongIsNamedAndNothingIsInForceThen) {
   EXPECT_EQ(wrong([](JointTrajectory& t) { t.points[1].positions.push_back(1); }),
             "points[1]/positions has 2 values of 1 joints");
   EXPECT_EQ(wrong([](JointTrajectory& t) { t.points[1].velocities = {HUGE_VAL}; }), "points[1]/velocities[0] is inf");
+  EXPECT_EQ(wrong([](JointTrajectory& t) {
+              t.points[0].accelerations = {0, 0};
+            }),
+            "points[0]/accelerations has 2 values of 1 joints");
   EXPECT_EQ(wrong([](JointTrajectory& t) { t.points[2].time_from_start = ros::Duration(0.5); }),
             "points[2]/time_from_start is 0.5 s, after 1 s");
   EXPECT_EQ(wrong([](JointTrajectory& t) { t.points[0].time_from_start = ros::Duration(0.5); }),
@@ -406,6 +410,31 @@ TEST(IntendedMotion, ACubicIsFollowedWhereThePointsHaveSpeeds) {
   EXPECT_EQ(lift.step(1.1, 0.1 - 0.2 * (3 * 0.01 - 2 * 0.001)).along.unused, "");
   EXPECT_EQ(lift.step(1.5, 0).along.unused, "");
   EXPECT_EQ(lift.step(1.6, 0.02).along.unused, "no path is in force");
+}
+
+TEST(WouldTouch, AQuinticIsFollowedWhereThePointsHaveAccelerations) {
+  using Answer = deformable_ccd::WouldTouch::Response;
+  Lift lift(0.01, true);
+  lift.step(1, 0.1);
+  lift.step(1.1, 0.1);
+  JointTrajectory dips = lifts(0, {{0, 0.1}, {1, 0.1}});
+  for (auto& point : dips.points) point.velocities = {0};
+  EXPECT_EQ(lift.driven.pipeline.wouldTouch(dips).verdict, Answer::FREE);
+  for (auto& point : dips.points) point.accelerations = {-8};
+  // 0.1 - 4 u^2 (1 - u)^2, onto the table, 0.099 m below.
+  const Answer answer = lift.driven.pipeline.wouldTouch(dips);
+  EXPECT_EQ(answer.verdict, Answer::TOUCHES) << answer.reason;
+  EXPECT_LE(answer.first, 0.185);
+  EXPECT_GE(answer.first, 0.17);
+}
+
+TEST(WouldTouch, AJumpInNoTimeIsNoMotion) {
+  Lift lift(0.01, true);
+  lift.step(1, 0.1);
+  lift.step(1.1, 0.1);
+  const auto answer = lift.driven.pipeline.wouldTouch(lifts(0, {{0, 0.1}, {1e-9, -0.5}}));
+  EXPECT_EQ(answer.verdict, answer.NOT_PROVED);
+  EXPECT_EQ(answer.reason, "points[1]/time_from_start is 1e-09 s, after 0 s");
 }
 
 }  // namespace
