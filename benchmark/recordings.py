@@ -234,7 +234,7 @@ def robot_tf(data, folder, frames):
     with rosbag.Bag(str(source)) as bag:
         messages = [(topic, message, t.to_nsec()) for topic, message, t in bag.read_messages(topics=['/tf'])]
     for topic, message, t in messages:
-        transforms.add(message, False, t)
+        transforms.add(message, False, t, 'robot')
     transforms.finish()
     transforms.judge(2 ** 62, 0, 2 ** 62)
     begin, top, speed, size = messages[0][2] + NS // 5, 1.1, 0.1, 0.9
