@@ -175,8 +175,8 @@ def maps(data, folder, frames):
     rope = np.load(data / 'recordings/rope_sim/positions.npy').astype(float)[:frames or 400]
     for path in sorted((data / 'recordings/maps').glob('*.bt')):
         tree = came.octomap(path.read_bytes(), True, 'OcTree', 0)
-        low, high = tree.boxes()
-        begin, end = low.min(0), high.max(0)
+        low = (tree.corners - 32768) * tree.resolution
+        begin, end = low.min(0), (low + tree.sizes[:, None] * tree.resolution).max(0)
         begin[2] = end[2] = np.median(low[:, 2])
         np.save(folder / 'carried.npy', rope + np.linspace(begin, end, len(rope))[:, None])
         bag = folder / (path.stem + '.bag')
