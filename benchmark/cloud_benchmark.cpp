@@ -243,7 +243,7 @@ nlohmann::json measureAll(const std::string& only, int repeat, int repeat_server
     std::cerr << out["runs"].back().dump() << '\n';
   };
   const auto camera = [&](const std::string& name, double required_ms, double speed_mps, Form form) {
-    row(name, [&] { return cameraCase(name, required_ms, 0.02, 1.5, 640, 480, 525, speed_mps, form, 12); });
+    row(name, [&] { return cameraCase(name, required_ms, 0.02, 1.5, 640, 480, 525, speed_mps, form, 16); });
   };
   camera("640 x 480 points in rows, 2 cm, 1.5 m away, still", 16, 0, Form::POINTS_IN_ROWS);
   camera("the same, moving at 0.3 m/s", 25, 0.3, Form::POINTS_IN_ROWS);
@@ -252,8 +252,8 @@ nlohmann::json measureAll(const std::string& only, int repeat, int repeat_server
   camera("640 x 480 without lost points, still", 25, 0, Form::POINTS);
   camera("640 x 480 without lost points, moving at 0.3 m/s", 25, 0.3, Form::POINTS);
   const std::string fine = "848 x 480 points in rows, 5 mm, 1 m away, moving at 0.3 m/s";
-  row(fine, [&] { return cameraCase(fine, 80, 0.005, 1, 848, 480, 425, 0.3, Form::POINTS_IN_ROWS, 8); });
-  row("lidar", [&] { return lidarCase(8); });
+  row(fine, [&] { return cameraCase(fine, 80, 0.005, 1, 848, 480, 425, 0.3, Form::POINTS_IN_ROWS, 16); });
+  row("lidar", [&] { return lidarCase(16); });
   return out;
 }
 

@@ -1,21 +1,11 @@
 # The libraries and tools that need OctoMap, ROS and PCL.
 
-# --- octomap bytes to voxel surfaces: the only user of liboctomap, free of ROS -----------------------------------------
-file(GLOB OCTOMAP_SOURCES CONFIGURE_DEPENDS src/octomap/*.cpp)
-if(OCTOMAP_SOURCES)
-  add_library(deformable_ccd_octomap SHARED ${OCTOMAP_SOURCES})
-  target_include_directories(deformable_ccd_octomap PUBLIC include PRIVATE src)
-  target_include_directories(deformable_ccd_octomap SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
-  target_link_libraries(deformable_ccd_octomap PUBLIC deformable_ccd ${OCTOMAP_LIBRARIES})
-  list(APPEND ROS_LINK_LIBRARIES deformable_ccd_octomap)
-endif()
-
 # --- the node: what comes in, its options, what goes out, and the class that holds them ---------------------------------
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 file(GLOB ROS_SOURCES CONFIGURE_DEPENDS
   src/input/*.cpp src/config/*.cpp src/robot/*.cpp src/output/*.cpp src/node/*.cpp)
 list(APPEND ROS_SOURCES ${MESSAGE_TYPES})
-list(APPEND ROS_LINK_LIBRARIES deformable_ccd ${catkin_LIBRARIES} yaml-cpp)
+list(APPEND ROS_LINK_LIBRARIES deformable_ccd deformable_ccd_octomap ${catkin_LIBRARIES} yaml-cpp)
 if(ROS_SOURCES)
   add_library(deformable_ccd_ros SHARED ${ROS_SOURCES})
   add_dependencies(deformable_ccd_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})

@@ -11,14 +11,15 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr double CELLS_A_VOXEL = 3;    // along a side, where voxels are the smallest; of 2 too few rays are left
-constexpr double CELLS_A_POINT = 4;    // at most
+// Along a side, where voxels are the smallest: of a camera's points, and of points all around, whose far ends are
+// followed one by one. With fewer too few rays are left.
+constexpr double CELLS_A_VOXEL = 2.5, CELLS_ALL_AROUND = 1.5;
+constexpr double CELLS_A_POINT = 2;    // at most
 constexpr double MOST_TANGENT = 2;     // of a face that is the only one
 constexpr double MOST_PIXELS = 32000;  // along a side
 constexpr std::size_t CELL_BYTES = 24, SAMPLES = 512;
 constexpr int RECENT_BITS = 15;
 constexpr double SQRT3 = 1.7320508075688772;
-constexpr double RAYS_A_VOXEL = 2;  // along each axis: of the rays that end in such a part of a voxel, one is followed
 
 bool isMeasured(const float* p, double near2) {
   const double x = p[0], y = p[1], z = p[2], square = x * x + y * y + z * z;
@@ -150,7 +151,7 @@ void CloudRays::follow(const SensorView& view, double near2, const Vector3d& sen
     if (away <= from) continue;
     const Vector3d start = sensor + way * (from / away), end = sensor + way * std::min(1.0, to / away);
     if (!(start.minCoeff() >= 0 && start.maxCoeff() < 65536)) continue;  // and so it goes on
-    const std::uint64_t word = cellWord(RAYS_A_VOXEL * end) << 1 | (away > to ? 1u : 0u);
+    const std::uint64_t word = cellWord(end) << 1 | (away > to ? 1u : 0u);
     std::uint64_t& last = recent_[word * 0x9e3779b97f4a7c15u >> (64 - RECENT_BITS)];
     if (last != word) followed_.add(start, end);
     last = word;
@@ -178,9 +179,10 @@ void CloudRays::read(const SensorView& view, const ViewLimits& limits, std::size
     longest = std::max(longest, (face.hi - face.lo).maxCoeff());
   }
   const double most_cells = std::min(CELLS_A_POINT * double(view.width * view.height), double(most_bytes / CELL_BYTES));
-  const double needed = CELLS_A_VOXEL * std::min(clear, farthest_m_ * limits.voxels_per_m);
+  const double cells_a_voxel = face_count_ == 1 ? CELLS_A_VOXEL : CELLS_ALL_AROUND;
+  const double needed = cells_a_voxel * std::min(clear, farthest_m_ * limits.voxels_per_m);
   const double focal = std::min(needed, std::min(std::sqrt(most_cells / area), MOST_PIXELS / longest));
-  const double pictured = focal < needed ? focal / CELLS_A_VOXEL : clear;
+  const double pictured = focal < needed ? focal / cells_a_voxel : clear;
   const Eigen::Matrix3d from_meters = view.map_from_sensor.linear() * limits.voxels_per_m;
 
   followed_.clear(most_bytes);

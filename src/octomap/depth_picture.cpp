@@ -14,6 +14,12 @@ constexpr double DEPTH_ROUNDING = 1e-6, ROUNDING_PX = 1e-3;
 // Rays that nearly cross a voxel: if none of so many does, it stays. Beside the sensor all of them nearly do.
 constexpr int MOST_TRIED = 64;
 
+/// Of 0 or more.
+std::int32_t upOf(double number) {
+  const auto whole = static_cast<std::int32_t>(number);
+  return whole + (whole < number);
+}
+
 }  // namespace
 
 float* DepthPicture::depths(std::size_t width, std::size_t height) {
@@ -116,8 +122,8 @@ Seen DepthPicture::look(const OctreeCube& cube) {
     const double lo = at[axis] - reach[axis], hi = at[axis] + reach[axis];
     const double from = middle + lo * (lo >= 0 ? of_far : of_near) - off;
     const double to = middle + hi * (hi >= 0 ? of_near : of_far) + off;
-    first = from > 0 ? static_cast<std::int32_t>(std::min<double>(std::ceil(from), count)) : 0;
-    last = to < count - 1 ? static_cast<std::int32_t>(std::max<double>(std::floor(to), -1)) : count - 1;
+    first = from > 0 ? upOf(std::min<double>(from, count)) : 0;
+    last = to < count - 1 ? (to < 0 ? -1 : static_cast<std::int32_t>(to)) : count - 1;
     return from >= 0 && to <= count - 1;
   };
   const bool is_inside =
@@ -129,22 +135,26 @@ Seen DepthPicture::look(const OctreeCube& cube) {
   const float* const last = level == 0 ? squares.nearest.data() : squares.farthest.data();
   // Always three by three, some more than once: processors guess badly how many there are of each cube.
   const std::int32_t u0 = area_.u0 >> level, u1 = area_.u1 >> level, v0 = area_.v0 >> level, v1 = area_.v1 >> level;
-  std::size_t at_squares[9];
-  for (std::int32_t i = 0; i < 9; ++i) {
-    const std::int32_t v = std::min(v0 + i / 3, v1), u = std::min(u0 + i % 3, u1);
-    at_squares[i] = static_cast<std::size_t>(v) * squares.width + u;
-  }
-  float least = NOWHERE, most = -NOWHERE;
-  for (const std::size_t i : at_squares) most = last[i] > most ? last[i] : most;
+  const std::size_t columns[3] = {std::size_t(u0), std::size_t(std::min(u0 + 1, u1)), std::size_t(u1)};
+  const std::size_t width = squares.width, rows[3] = {v0 * width, std::min(v0 + 1, v1) * width, v1 * width};
+  const auto best = [&](const auto* values, auto start, const auto& better) {
+    for (const std::size_t row : rows) {
+      for (const std::size_t column : columns) {
+        const auto value = values[row + column];
+        start = better(value, start) ? value : start;
+      }
+    }
+    return start;
+  };
+  const float most = best(last, -NOWHERE, [](float a, float b) { return a > b; });
   if (static_cast<double>(most) < nearest) return Seen::NONE;
-  for (const std::size_t i : at_squares) least = squares.nearest[i] < least ? squares.nearest[i] : least;
-  int hole = 0;
-  for (int i = 0; has_holes_ && i < 9; ++i) hole = std::max<int>(hole, squares.hole[at_squares[i]]);
+  const float least = best(squares.nearest.data(), NOWHERE, [](float a, float b) { return a < b; });
+  const int hole = has_holes_ ? best(squares.hole.data(), std::uint8_t{0}, [](int a, int b) { return a > b; }) : 0;
   nearest_m_ = nearest;
   farthest_m_ = farthest;
   const double side = square_px_ / farthest - 2 * off;
   const bool all_pass = is_inside && nearest > 0 && static_cast<double>(least) > farthest && side >= 1 &&
-                        hole < std::min<double>(std::floor(side), MOST_HOLE) && away2 <= in * in;
+                        hole < static_cast<int>(std::min<double>(side, MOST_HOLE)) && away2 <= in * in;
   if (all_pass) return Seen::ALL;
   const auto inside = [&](int axis, double middle, std::int32_t lo, std::int32_t hi) {
     const double to = at[2] > 0 ? middle + at[axis] / at[2] : 0.5 * (lo + hi);

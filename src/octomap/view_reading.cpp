@@ -74,11 +74,9 @@ void ViewReader::readPoints(const SensorView& view, const ViewLimits& limits, fl
     places.count = std::min(simd::PointPlaces::MOST, view.width - first % view.width);  // of one row
     takeInto(first, grid, places);
     if (depths) std::copy(places.depth, places.depth + places.count, depths + first);
-    for (std::size_t i = 0; i < places.count; ++i) {
-      if (places.repeats[i] != 0) {
-        ++counts.filled;
-        continue;
-      }
+    counts.filled += places.count - places.fresh_count;
+    for (std::size_t f = 0; f < places.fresh_count; ++f) {
+      const auto i = static_cast<std::size_t>(places.fresh[f]);
       const double away2 = places.away2[i];
       if (away2 == 0 || away2 < near2) {
         const Kind kind = away2 == 0 ? kindOf(first + i) : Kind::POINT;

@@ -24,7 +24,7 @@ void locateAxis(const double* HWY_RESTRICT place, size_t count, double sensor, d
   }
 }
 
-void findRepeats(const PlaceLimits& limits, PointPlaces& places) {
+void findFresh(const PlaceLimits& limits, PointPlaces& places) {
   const size_t count = places.count;
   const int32_t* const x = places.key[0];
   const int32_t* const y = places.key[1];
@@ -35,11 +35,18 @@ void findRepeats(const PlaceLimits& limits, PointPlaces& places) {
     const bool is_within = (away2 > 0) & (away2 >= limits.nearest2) & (away2 <= limits.farthest2);
     within[i] = is_within ? places.is_in[i] : 0;
   }
-  places.repeats[0] = 0;
+  int32_t is_fresh[PointPlaces::MOST];
+  is_fresh[0] = 1;
   for (size_t i = 1; i < count; ++i) {
     const int32_t differs = (x[i] ^ x[i - 1]) | (y[i] ^ y[i - 1]) | (z[i] ^ z[i - 1]);
-    places.repeats[i] = within[i] & within[i - 1] & (differs == 0 ? 1 : 0);
+    is_fresh[i] = 1 ^ (within[i] & within[i - 1] & (differs == 0 ? 1 : 0));
   }
+  size_t fresh_count = 0;
+  for (size_t i = 0; i < count; ++i) {  // processors guess badly which they are
+    places.fresh[fresh_count] = static_cast<int32_t>(i);
+    fresh_count += static_cast<size_t>(is_fresh[i]);
+  }
+  places.fresh_count = fresh_count;
 }
 
 void locate(const PlaceLimits& limits, PointPlaces& places) {
@@ -52,7 +59,7 @@ void locate(const PlaceLimits& limits, PointPlaces& places) {
   for (int a = 0; a < 3; ++a) {
     locateAxis(axes[a], count, limits.sensor[a], limits.lo[a], limits.hi[a], places.key[a], places.is_in);
   }
-  findRepeats(limits, places);
+  findFresh(limits, places);
 }
 
 void PlaceDepths(const float* HWY_RESTRICT depth_m, const double* HWY_RESTRICT first, const double* HWY_RESTRICT right,
@@ -74,26 +81,47 @@ void PlaceDepths(const float* HWY_RESTRICT depth_m, const double* HWY_RESTRICT f
   locate(limits, places);
 }
 
-void PlacePoints(const float* HWY_RESTRICT xyz, const double* HWY_RESTRICT m, const double* HWY_RESTRICT ahead,
-                 const PlaceLimits& limits, PointPlaces& places) {
-  const size_t count = places.count;
-  for (size_t i = 0; i < count; ++i) {
-    const float *p = xyz + 3 * i, sum = p[0] * 0 + p[1] * 0 + p[2] * 0;
-    const bool is_point = sum == 0;
-    const double x = is_point ? p[0] : 0.0f, y = is_point ? p[1] : 0.0f, z = is_point ? p[2] : 0.0f;
-    places.x[i] = m[0] * x + m[3] * y + m[6] * z;
-    places.y[i] = m[1] * x + m[4] * y + m[7] * z;
-    places.z[i] = m[2] * x + m[5] * y + m[8] * z;
-    places.depth[i] = static_cast<float>(ahead[0] * x + ahead[1] * y + ahead[2] * z);
-  }
-  locate(limits, places);
-}
-
 template <class D>
 hn::Vec<D> along(const double* way, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) {
   const D d;
   const auto xy = hn::Add(hn::Mul(hn::Set(d, way[0]), x), hn::Mul(hn::Set(d, way[1]), y));
   return hn::Add(xy, hn::Mul(hn::Set(d, way[2]), z));
+}
+
+/// Of at least as many points as a vector has lanes. The last points of a row are placed again with those before.
+template <class D>
+void placeAll(D d, const float* HWY_RESTRICT xyz, const double* m, const double* ahead, PointPlaces& places) {
+  const hn::Rebind<float, D> floats;
+  const size_t lanes = hn::Lanes(d), count = places.count;
+  const double to_x[3] = {m[0], m[3], m[6]}, to_y[3] = {m[1], m[4], m[7]}, to_z[3] = {m[2], m[5], m[8]};
+  const auto none = hn::Zero(floats);
+  double depth[PointPlaces::MOST];
+  for (size_t next = 0; next < count; next += lanes) {
+    const size_t i = next + lanes <= count ? next : count - lanes;
+    hn::Vec<decltype(floats)> px, py, pz;
+    hn::LoadInterleaved3(floats, xyz + 3 * i, px, py, pz);
+    const auto sum = hn::Add(hn::Add(hn::Mul(px, none), hn::Mul(py, none)), hn::Mul(pz, none));
+    const auto is_point = hn::Eq(sum, none);
+    const auto x = hn::PromoteTo(d, hn::IfThenElseZero(is_point, px));
+    const auto y = hn::PromoteTo(d, hn::IfThenElseZero(is_point, py));
+    const auto z = hn::PromoteTo(d, hn::IfThenElseZero(is_point, pz));
+    hn::StoreU(along<D>(to_x, x, y, z), d, places.x + i);
+    hn::StoreU(along<D>(to_y, x, y, z), d, places.y + i);
+    hn::StoreU(along<D>(to_z, x, y, z), d, places.z + i);
+    hn::StoreU(along<D>(ahead, x, y, z), d, depth + i);
+  }
+  for (size_t i = 0; i < count; ++i) places.depth[i] = static_cast<float>(depth[i]);  // as plain numbers overflow
+}
+
+void PlacePoints(const float* HWY_RESTRICT xyz, const double* HWY_RESTRICT m, const double* HWY_RESTRICT ahead,
+                 const PlaceLimits& limits, PointPlaces& places) {
+  const hn::ScalableTag<double> d;
+  if (places.count >= hn::Lanes(d)) {
+    placeAll(d, xyz, m, ahead, places);
+  } else {
+    placeAll(hn::CappedTag<double, 1>(), xyz, m, ahead, places);
+  }
+  locate(limits, places);
 }
 
 /// For rows of at least as many points as a vector has lanes.

@@ -18,9 +18,10 @@ struct PointPlaces {
   float depth[MOST];
   std::int32_t key[3][MOST];  ///< of those that are in
   std::int32_t is_in[MOST];   ///< the limits: 1, or 0
-  /// 1: as the one before it lies in the limits, further away than nothing, at the least the nearest and at the most
-  /// the farthest, and in the same voxel. Else 0.
-  std::int32_t repeats[MOST];
+  /// All but those that lie, as the one before, in the limits, further away than nothing, at the least the nearest and
+  /// at the most the farthest, and in the same voxel.
+  std::int32_t fresh[MOST];
+  std::size_t fresh_count = 0;
 };
 
 /// [voxels] From the corner of the voxel whose key is 0. The limits are within 0 and 65536; hi is exclusive.

@@ -1,0 +1,7 @@
+# Octomap bytes to voxel surfaces: the only user of liboctomap, free of ROS. The benchmarks need it, too.
+find_package(octomap REQUIRED)  #catkin_lint: ignore duplicate_find
+file(GLOB OCTOMAP_SOURCES CONFIGURE_DEPENDS src/octomap/*.cpp)
+add_library(deformable_ccd_octomap SHARED ${OCTOMAP_SOURCES})
+target_include_directories(deformable_ccd_octomap PUBLIC include PRIVATE src)
+target_include_directories(deformable_ccd_octomap SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
+target_link_libraries(deformable_ccd_octomap PUBLIC deformable_ccd ${OCTOMAP_LIBRARIES})
