@@ -41,9 +41,8 @@ bool Growth::isGroup(const VoxelKey& voxel) const {
   return group.size() >= GROUP;
 }
 
-std::vector<OccupiedLeaf> Growth::beside(const std::vector<std::uint64_t>& keys, bool is_doubted,
-                                         StampNs& free_ns) const {
-  std::vector<OccupiedLeaf> found;
+std::vector<Growth::Seed> Growth::beside(const std::vector<std::uint64_t>& keys, bool is_doubted) const {
+  std::vector<Seed> found;
   if (keys.empty() || grown_.empty()) return found;
   KeyBox near = around(unpacked(keys.front()));
   for (const std::uint64_t key : keys) {
@@ -58,26 +57,32 @@ std::vector<OccupiedLeaf> Growth::beside(const std::vector<std::uint64_t>& keys,
     if (one.is_doubted != is_doubted) continue;
     auto take = [&](const OccupiedLeaf& voxel) {
       const bool touches = anyAround(voxel.min, [&](std::uint64_t key) { return all.count(key) > 0; });
-      if (!touches || (one.cube.size == 1 && !isGroup(voxel.min))) return;
-      found.push_back(voxel);
-      free_ns = std::max(free_ns, one.free_ns);
+      if (touches && (one.cube.size > 1 || isGroup(voxel.min))) found.push_back({voxel, one.free_ns});
     };
     visitVoxels(one.cube, near, take);
   }
   return found;
 }
 
-std::vector<std::uint64_t> Growth::touched(const std::vector<std::uint64_t>& keys,
-                                           const std::vector<OccupiedLeaf>& seeds) const {
-  if (misses_some_) return keys;
+std::vector<Growth::Seed> Growth::touched(const std::vector<std::uint64_t>& keys, std::vector<Seed> seeds) const {
   std::unordered_set<std::uint64_t> left(keys.begin(), keys.end());
-  std::vector<std::uint64_t> touched;
-  const auto take = [&](std::uint64_t key) {
-    if (left.erase(key) > 0) touched.push_back(key);
+  std::vector<Seed> touched;
+  const auto take = [&](std::uint64_t key, StampNs free_ns) {
+    if (left.erase(key) > 0) touched.push_back({{unpacked(key), 1}, free_ns});
     return false;
   };
-  for (const OccupiedLeaf& seed : seeds) anyAround(seed.min, take);
-  for (std::size_t i = 0; i < touched.size(); ++i) anyAround(unpacked(touched[i]), take);
+  std::sort(seeds.begin(), seeds.end(), [](const Seed& a, const Seed& b) { return a.free_ns > b.free_ns; });
+  if (misses_some_) {
+    const StampNs free_ns = seeds.empty() ? too_many_ns_ : std::max(too_many_ns_, seeds.front().free_ns);
+    for (const std::uint64_t key : keys) take(key, free_ns);
+  }
+  std::size_t next = 0;
+  for (const Seed& seed : seeds) {
+    anyAround(seed.voxel.min, [&](std::uint64_t key) { return take(key, seed.free_ns); });
+    for (; next < touched.size(); ++next) {
+      anyAround(touched[next].voxel.min, [&](std::uint64_t key) { return take(key, seed.free_ns); });
+    }
+  }
   return touched;
 }
 

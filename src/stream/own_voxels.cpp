@@ -64,7 +64,7 @@ void OwnVoxelFinder::listChanges(Look& look) {
   const KeyBox& region = look.mayBeNear() && before_ ? ALL_KEYS : look.region;
   const auto take = [&](const OccupiedLeaf& part) {
     const bool was_free = look.change.has_before && !unseen_.holds(part);
-    if (was_free && !isInside(part, region)) growth_.add(part, false, before_ns_, look.map.stamp_ns);
+    if (was_free && showsGrowth() && !isInside(part, region)) growth_.add(part, false, before_ns_, look.map.stamp_ns);
     visitVoxels(part, region, appeared);
   };
   visitDifference(now, before, [&](const OccupiedLeaf& fresh) {
@@ -122,7 +122,7 @@ void OwnVoxelFinder::appear(const ReachedCube& cube, Look& look) {
   VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
   const bool on_trust = look.trust_first && !cube.near.empty() && (!was_free || isNotYet(*cube.near.begin()));
   if (on_trust) state = VoxelState::OWN;
-  if ((was_free || was_seen) && state != VoxelState::OWN)
+  if (((was_free && showsGrowth()) || was_seen) && state != VoxelState::OWN)
     growth_.add(cube.leaf, state == VoxelState::DOUBT, before_ns_, look.map.stamp_ns);
   if (state == VoxelState::OBSTACLE) return;
   if (owners.empty()) owners = cube.near;
@@ -176,13 +176,13 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
   }
   const StampNs now_ns = look.map.stamp_ns, since_ns = now_ns - nanoseconds(tolerance::OWN_GROWTH_S);
   growth_.keep(look.change.now, look.change.before, since_ns, now_ns);
-  StampNs free_ns = std::numeric_limits<StampNs>::min();  // what grew on goes by what it grew from
-  std::vector<OccupiedLeaf> seeds = growth_.beside(own, true, free_ns);
-  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
-    if (cube.near.empty()) seeds.push_back(cube.leaf);
+  std::vector<Growth::Seed> seeds = growth_.beside(own, true);
+  for (const Growth::Seed& seed : look.outOfReach(growth_.beside(own, false), bodies, ways)) seeds.push_back(seed);
+  std::vector<std::uint64_t> grew;
+  for (const Growth::Seed& one : growth_.touched(own, std::move(seeds))) {
+    growth_.add(one.voxel, true, one.free_ns, now_ns);  // what grew on goes by what it grew from
+    grew.push_back(packed(one.voxel.min));
   }
-  std::vector<std::uint64_t> grew = growth_.touched(own, seeds);
-  for (const std::uint64_t key : grew) growth_.add({unpacked(key), 1}, true, free_ns, now_ns);
   std::sort(grew.begin(), grew.end());
   for (Stated& voxel : look.appeared) {
     const std::uint64_t key = packed(voxel.key);
@@ -206,10 +206,7 @@ void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody
     if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
     if (voxel.shown && voxel.state == VoxelState::DOUBT && voxel.grew) from.push_back({voxel.key, 1});
   }
-  StampNs free_ns = 0;  // it is no matter when
-  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
-    if (cube.near.empty()) from.push_back(cube.leaf);
-  }
+  for (const Growth::Seed& seed : look.outOfReach(growth_.beside(own, false), bodies, ways)) from.push_back(seed.voxel);
   double reach_m = 0;
   for (const TrackedBody& body : bodies) reach_m = std::max(reach_m, body.reach_m);
   const double resolution_m = look.map.surface->resolution();
