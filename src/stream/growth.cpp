@@ -22,7 +22,7 @@ void Growth::keep(const VoxelTree& now, const VoxelTree& before, StampNs since_n
            (one.added_ns != now_ns && coverage(before, one.cube) == NONE);
   };
   grown_.erase(std::remove_if(grown_.begin(), grown_.end(), is_over), grown_.end());
-  misses_some_ = too_many_ns_ > since_ns;
+  if (too_many_ns_ <= since_ns) too_many_ns_ = NEVER_NS;
   voxels_.clear();
   for (const Grown& one : grown_) {
     if (one.cube.size == 1) voxels_.insert(packed(one.cube.min));
@@ -65,23 +65,24 @@ std::vector<Growth::Seed> Growth::beside(const std::vector<std::uint64_t>& keys,
 }
 
 std::vector<Growth::Seed> Growth::touched(const std::vector<std::uint64_t>& keys, std::vector<Seed> seeds) const {
-  std::unordered_set<std::uint64_t> left(keys.begin(), keys.end());
-  std::vector<Seed> touched;
-  const auto take = [&](std::uint64_t key, StampNs free_ns) {
-    if (left.erase(key) > 0) touched.push_back({{unpacked(key), 1}, free_ns});
-    return false;
-  };
   std::sort(seeds.begin(), seeds.end(), [](const Seed& a, const Seed& b) { return a.free_ns > b.free_ns; });
-  if (misses_some_) {
+  std::vector<Seed> touched;
+  if (too_many_ns_ != NEVER_NS) {
     const StampNs free_ns = seeds.empty() ? too_many_ns_ : std::max(too_many_ns_, seeds.front().free_ns);
-    for (const std::uint64_t key : keys) take(key, free_ns);
+    for (const std::uint64_t key : keys) touched.push_back({{unpacked(key), 1}, free_ns});
+    return touched;
   }
+  std::unordered_set<std::uint64_t> left(keys.begin(), keys.end());
+  const auto takeAround = [&](Seed from) {
+    anyAround(from.voxel.min, [&](std::uint64_t key) {
+      if (left.erase(key) > 0) touched.push_back({{unpacked(key), 1}, from.free_ns});
+      return false;
+    });
+  };
   std::size_t next = 0;
   for (const Seed& seed : seeds) {
-    anyAround(seed.voxel.min, [&](std::uint64_t key) { return take(key, seed.free_ns); });
-    for (; next < touched.size(); ++next) {
-      anyAround(touched[next].voxel.min, [&](std::uint64_t key) { return take(key, seed.free_ns); });
-    }
+    takeAround(seed);
+    for (; next < touched.size(); ++next) takeAround(touched[next]);
   }
   return touched;
 }

@@ -46,7 +46,6 @@ class Growth {
   };
   std::deque<Grown> grown_;
   StampNs too_many_ns_ = NEVER_NS;  // of some that were not kept
-  bool misses_some_ = false;
   std::unordered_set<std::uint64_t> voxels_;  // of grown_, packed
 
   bool isGroup(const VoxelKey& voxel) const;

@@ -170,48 +170,56 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
 /// should memory end, the same map comes again.
 void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody>& bodies,
                                        const std::vector<BodyWay>& ways) {
-  std::vector<std::uint64_t> own;
+  std::vector<std::uint64_t> appeared;
   for (const Stated& voxel : look.appeared) {
-    if (voxel.state == VoxelState::OWN) own.push_back(packed(voxel.key));
+    if (voxel.state == VoxelState::OWN) appeared.push_back(packed(voxel.key));
+  }
+  std::vector<std::uint64_t> own = appeared;
+  for (const auto& [key, voxel] : stated_) {
+    if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
   }
   const StampNs now_ns = look.map.stamp_ns, since_ns = now_ns - nanoseconds(tolerance::OWN_GROWTH_S);
   growth_.keep(look.change.now, look.change.before, since_ns, now_ns);
-  std::vector<Growth::Seed> seeds = growth_.beside(own, true);
-  for (const Growth::Seed& seed : look.outOfReach(growth_.beside(own, false), bodies, ways)) seeds.push_back(seed);
-  std::vector<std::uint64_t> grew;
-  for (const Growth::Seed& one : growth_.touched(own, std::move(seeds))) {
-    growth_.add(one.voxel, true, one.free_ns, now_ns);  // what grew on goes by what it grew from
-    grew.push_back(packed(one.voxel.min));
+  std::vector<Growth::Seed> seeds = growth_.beside(appeared, true);
+  const std::vector<Growth::Seed> obstacles = growth_.beside(own, false);
+  std::vector<OccupiedLeaf> asked, outside;
+  for (const Growth::Seed& one : obstacles) asked.push_back(one.voxel);
+  const std::vector<ReachedCube> cubes = look.reached(asked, bodies, ways);
+  for (std::size_t i = 0; i < cubes.size(); ++i) {
+    if (!cubes[i].near.empty()) continue;
+    seeds.push_back(obstacles[i]);
+    outside.push_back(asked[i]);
   }
-  std::sort(grew.begin(), grew.end());
+  std::unordered_set<std::uint64_t> grew;
+  for (const Growth::Seed& one : growth_.touched(appeared, std::move(seeds))) {
+    growth_.add(one.voxel, true, one.free_ns, now_ns);  // what grew on goes by what it grew from
+    grew.insert(packed(one.voxel.min));
+  }
   for (Stated& voxel : look.appeared) {
     const std::uint64_t key = packed(voxel.key);
-    if (std::binary_search(grew.begin(), grew.end(), key)) {
+    if (grew.count(key) > 0) {
       voxel.state = VoxelState::DOUBT;
       voxel.grew = true;
     }
     stated_[key] = voxel;
   }
   seen_alone_ = std::move(look.seen_alone);
-  listEntered(look, bodies, ways);
+  listEntered(look, bodies, std::move(outside));
 }
 
 /// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
-/// met voxels that were own before and so did not appear.
+/// met voxels that were own before and so did not appear. from: what grew out of reach beside own voxels.
 void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody>& bodies,
-                                 const std::vector<BodyWay>& ways) {
-  std::vector<std::uint64_t> own;
-  std::vector<OccupiedLeaf> from;
+                                 std::vector<OccupiedLeaf> from) {
+  std::unordered_set<std::uint64_t> left;
   for (const auto& [key, voxel] : stated_) {
-    if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
+    if (voxel.shown && voxel.state == VoxelState::OWN) left.insert(key);
     if (voxel.shown && voxel.state == VoxelState::DOUBT && voxel.grew) from.push_back({voxel.key, 1});
   }
-  for (const Growth::Seed& seed : look.outOfReach(growth_.beside(own, false), bodies, ways)) from.push_back(seed.voxel);
   double reach_m = 0;
   for (const TrackedBody& body : bodies) reach_m = std::max(reach_m, body.reach_m);
   const double resolution_m = look.map.surface->resolution();
   entered_.clear();
-  std::unordered_set<std::uint64_t> left(own.begin(), own.end());
   for (double deep_m = -resolution_m; deep_m < reach_m && !from.empty(); deep_m += resolution_m) {
     std::vector<OccupiedLeaf> next;
     const auto enter = [&](std::uint64_t key) {

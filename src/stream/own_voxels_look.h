@@ -66,8 +66,6 @@ struct OwnVoxelFinder::Look {
   /// The cubes, and whether some body came near: one is enough.
   std::vector<ReachedCube> reached(const std::vector<OccupiedLeaf>& leaves, const std::vector<TrackedBody>& bodies,
                                    const std::vector<BodyWay>& ways) const;
-  std::vector<Growth::Seed> outOfReach(const std::vector<Growth::Seed>& seeds, const std::vector<TrackedBody>& bodies,
-                                       const std::vector<BodyWay>& ways) const;
   void ask(const OccupiedLeaf& leaf, ReachedCube::Why why, const BodySet& asked = {}) {
     cubes.push_back({leaf, why, leafBox(leaf, map.surface->resolution()), asked});
   }

@@ -55,19 +55,6 @@ std::vector<ReachedCube> OwnVoxelFinder::Look::reached(const std::vector<Occupie
   return found;
 }
 
-std::vector<Growth::Seed> OwnVoxelFinder::Look::outOfReach(const std::vector<Growth::Seed>& seeds,
-                                                           const std::vector<TrackedBody>& bodies,
-                                                           const std::vector<BodyWay>& ways) const {
-  std::vector<OccupiedLeaf> voxels;
-  for (const Growth::Seed& seed : seeds) voxels.push_back(seed.voxel);
-  const std::vector<ReachedCube> cubes = reached(voxels, bodies, ways);
-  std::vector<Growth::Seed> out;
-  for (std::size_t i = 0; i < seeds.size(); ++i) {
-    if (cubes[i].near.empty()) out.push_back(seeds[i]);
-  }
-  return out;
-}
-
 bool OwnVoxelFinder::Look::addBoxOf(const TrackedBody& body, const BodyWay& way) {
   Eigen::AlignedBox3d reached;
   bool turns = false;
