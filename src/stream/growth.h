@@ -45,7 +45,7 @@ class Growth {
     StampNs free_ns, added_ns;
   };
   std::deque<Grown> grown_;
-  StampNs too_many_ns_ = NEVER_NS;  // of some that were not kept
+  StampNs too_many_ns_ = NEVER_NS;            // of some that were not kept
   std::unordered_set<std::uint64_t> voxels_;  // of grown_, packed
 
   bool isGroup(const VoxelKey& voxel) const;
