@@ -64,7 +64,8 @@ void OwnVoxelFinder::listChanges(Look& look) {
   const KeyBox& region = look.mayBeNear() && before_ ? ALL_KEYS : look.region;
   const auto take = [&](const OccupiedLeaf& part) {
     const bool was_free = look.change.has_before && !unseen_.holds(part);
-    if (was_free && showsGrowth() && !isInside(part, region)) growth_.add(part, false, before_ns_, look.map.stamp_ns);
+    if (was_free && look.shows_growth && !isInside(part, region))
+      growth_.add(part, false, before_ns_, look.map.stamp_ns);
     visitVoxels(part, region, appeared);
   };
   visitDifference(now, before, [&](const OccupiedLeaf& fresh) {
@@ -122,7 +123,7 @@ void OwnVoxelFinder::appear(const ReachedCube& cube, Look& look) {
   VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
   const bool on_trust = look.trust_first && !cube.near.empty() && (!was_free || isNotYet(*cube.near.begin()));
   if (on_trust) state = VoxelState::OWN;
-  if (((was_free && showsGrowth()) || was_seen) && state != VoxelState::OWN)
+  if (((was_free && look.shows_growth) || was_seen) && state != VoxelState::OWN)
     growth_.add(cube.leaf, state == VoxelState::DOUBT, before_ns_, look.map.stamp_ns);
   if (state == VoxelState::OBSTACLE) return;
   if (owners.empty()) owners = cube.near;
@@ -302,7 +303,8 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
             shapes_,
             trust_first,
             is_blind || since_s > tolerance::OWN_GAP_S,
-            is_blind};
+            is_blind,
+            past_.size() > 1};
   const std::vector<BodyWay> ways = waysOf(bodies, map.stamp_ns, lag_s);
   findSeams(look, bodies, lag_s);
   std::vector<TrackedBody> there;

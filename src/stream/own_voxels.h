@@ -78,8 +78,6 @@ class OwnVoxelFinder {
     bool may_be_near;
   };
 
-  /// What one map alone showed as free flickers: a sensor's first look.
-  bool showsGrowth() const { return past_.size() > 1; }
   void endWhereItMoved(const ObstacleMap& map, const std::vector<TrackedBody>& bodies);
   std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
   void findSeams(Look& look, const std::vector<TrackedBody>& bodies, double lag_s);

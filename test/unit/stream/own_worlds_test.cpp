@@ -334,16 +334,18 @@ TEST_F(OwnWorlds, WhatTheFirstMapAloneShowsFreeHasNotGrown) {
   const Cells table = cellsOf({0.001, 0.001, 0.001}, {0.3, 0.2, 0.019});
   const Cells rim = cellsOf({0.141, 0.091, 0.021}, {0.179, 0.129, 0.039});
   const Place above{{0.101, 0.051, 0.2}}, rests{{0.101, 0.051, 0.051}};
-  for (const int looks : {1, 2}) {
-    start(0.005);
-    map(table);
-    go(above, far_);
-    for (int k = 1; k < looks; ++k) map(table + above.cells());
-    go(above, far_);
-    map(table + rim + above.cells());
-    go(rests, far_);
-    map(table + rim + rests.cells());
-    EXPECT_EQ(isClear(go(rests, far_)), looks == 1) << looks;
+  for (const StampNs step_ns : {33 * MS, 100 * MS, 500 * MS}) {
+    for (const int looks : {1, 2, 3}) {
+      start(0.005);
+      map(table);
+      for (int k = 1; k < looks; ++k) {
+        go(above, far_, step_ns);
+        map(table + above.cells());
+      }
+      go(rests, far_, step_ns);
+      map(table + rim + rests.cells());
+      EXPECT_EQ(isClear(go(rests, far_, step_ns)), looks == 1) << looks << ' ' << step_ns;
+    }
   }
 }
 
