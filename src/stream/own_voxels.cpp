@@ -292,7 +292,6 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   std::size_t hidden = remembered_.size() + unseen_.size();
   for (const auto& one : stated_) hidden += one.second.shown ? 0 : 1;
   if (hidden > MOST_REMEMBERED) forget();
-
   const double since_s = before_ ? secondsBetween(before_ns_, map.stamp_ns) : 0;
   const bool is_blind = since_s < 0 || since_s > tolerance::OWN_PATH_S;
   Look look{map,
