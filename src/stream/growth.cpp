@@ -5,11 +5,6 @@
 
 namespace dccd {
 
-void Growth::clear() {
-  grown_.clear();
-  too_many_ns_ = NEVER_NS;
-}
-
 void Growth::add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns) {
   if (grown_.size() < MOST) return grown_.push_back({cube, is_doubted, free_ns, now_ns});
   too_many_ns_ = std::max(too_many_ns_, free_ns);
@@ -45,13 +40,7 @@ std::vector<Growth::Seed> Growth::beside(const std::vector<std::uint64_t>& keys,
   std::vector<Seed> found;
   if (keys.empty() || grown_.empty()) return found;
   KeyBox near = around(unpacked(keys.front()));
-  for (const std::uint64_t key : keys) {
-    const KeyBox box = around(unpacked(key));
-    for (std::size_t a = 0; a < 3; ++a) {
-      near.lo[a] = std::min(near.lo[a], box.lo[a]);
-      near.hi[a] = std::max(near.hi[a], box.hi[a]);
-    }
-  }
+  for (const std::uint64_t key : keys) extend(near, around(unpacked(key)));
   const std::unordered_set<std::uint64_t> all(keys.begin(), keys.end());
   for (const Grown& one : grown_) {
     if (one.is_doubted != is_doubted) continue;

@@ -33,7 +33,6 @@ class Growth {
   /// Which of the voxels touch one of the seeds, or one that does, and when the newest of these seeds was free; all
   /// where some were not kept.
   std::vector<Seed> touched(const std::vector<std::uint64_t>& keys, std::vector<Seed> seeds) const;
-  void clear();
 
   static constexpr std::size_t MOST = std::size_t{1} << 18, GROUP = 4;
 

@@ -27,8 +27,8 @@ void OwnVoxelFinder::forget() {
   stated_.clear();
   known_.clear();
   past_.clear();
-  unseen_.clear();
-  growth_.clear();
+  unseen_ = UnseenSpace();
+  growth_ = Growth();
   entered_.clear();
   remembered_.clear();
   seen_.clear();
