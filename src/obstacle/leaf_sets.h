@@ -43,6 +43,14 @@ inline bool isInside(const OccupiedLeaf& cube, const KeyBox& box) {
   return true;
 }
 
+/// Makes the box hold the other one, too.
+inline void extend(KeyBox& box, const KeyBox& other) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.lo[a] = std::min(box.lo[a], other.lo[a]);
+    box.hi[a] = std::max(box.hi[a], other.hi[a]);
+  }
+}
+
 /// Calls visit(voxel) for the finest voxels of a cube within the box.
 template <class Visit>
 void visitVoxels(const OccupiedLeaf& cube, const KeyBox& box, Visit& visit) {

@@ -5,11 +5,6 @@
 
 namespace dccd {
 
-void Growth::clear() {
-  grown_.clear();
-  too_many_ns_ = NEVER_NS;
-}
-
 void Growth::add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns) {
   if (grown_.size() < MOST) return grown_.push_back({cube, is_doubted, free_ns, now_ns});
   too_many_ns_ = std::max(too_many_ns_, free_ns);
@@ -22,7 +17,7 @@ void Growth::keep(const VoxelTree& now, const VoxelTree& before, StampNs since_n
            (one.added_ns != now_ns && coverage(before, one.cube) == NONE);
   };
   grown_.erase(std::remove_if(grown_.begin(), grown_.end(), is_over), grown_.end());
-  misses_some_ = too_many_ns_ > since_ns;
+  if (too_many_ns_ <= since_ns) too_many_ns_ = NEVER_NS;
   voxels_.clear();
   for (const Grown& one : grown_) {
     if (one.cube.size == 1) voxels_.insert(packed(one.cube.min));
@@ -41,43 +36,43 @@ bool Growth::isGroup(const VoxelKey& voxel) const {
   return group.size() >= GROUP;
 }
 
-std::vector<OccupiedLeaf> Growth::beside(const std::vector<std::uint64_t>& keys, bool is_doubted,
-                                         StampNs& free_ns) const {
-  std::vector<OccupiedLeaf> found;
+std::vector<Growth::Seed> Growth::beside(const std::vector<std::uint64_t>& keys, bool is_doubted) const {
+  std::vector<Seed> found;
   if (keys.empty() || grown_.empty()) return found;
   KeyBox near = around(unpacked(keys.front()));
-  for (const std::uint64_t key : keys) {
-    const KeyBox box = around(unpacked(key));
-    for (std::size_t a = 0; a < 3; ++a) {
-      near.lo[a] = std::min(near.lo[a], box.lo[a]);
-      near.hi[a] = std::max(near.hi[a], box.hi[a]);
-    }
-  }
+  for (const std::uint64_t key : keys) extend(near, around(unpacked(key)));
   const std::unordered_set<std::uint64_t> all(keys.begin(), keys.end());
   for (const Grown& one : grown_) {
     if (one.is_doubted != is_doubted) continue;
     auto take = [&](const OccupiedLeaf& voxel) {
       const bool touches = anyAround(voxel.min, [&](std::uint64_t key) { return all.count(key) > 0; });
-      if (!touches || (one.cube.size == 1 && !isGroup(voxel.min))) return;
-      found.push_back(voxel);
-      free_ns = std::max(free_ns, one.free_ns);
+      if (touches && (one.cube.size > 1 || isGroup(voxel.min))) found.push_back({voxel, one.free_ns});
     };
     visitVoxels(one.cube, near, take);
   }
   return found;
 }
 
-std::vector<std::uint64_t> Growth::touched(const std::vector<std::uint64_t>& keys,
-                                           const std::vector<OccupiedLeaf>& seeds) const {
-  if (misses_some_) return keys;
+std::vector<Growth::Seed> Growth::touched(const std::vector<std::uint64_t>& keys, std::vector<Seed> seeds) const {
+  std::sort(seeds.begin(), seeds.end(), [](const Seed& a, const Seed& b) { return a.free_ns > b.free_ns; });
+  std::vector<Seed> touched;
+  if (too_many_ns_ != NEVER_NS) {
+    const StampNs free_ns = seeds.empty() ? too_many_ns_ : std::max(too_many_ns_, seeds.front().free_ns);
+    for (const std::uint64_t key : keys) touched.push_back({{unpacked(key), 1}, free_ns});
+    return touched;
+  }
   std::unordered_set<std::uint64_t> left(keys.begin(), keys.end());
-  std::vector<std::uint64_t> touched;
-  const auto take = [&](std::uint64_t key) {
-    if (left.erase(key) > 0) touched.push_back(key);
-    return false;
+  const auto takeAround = [&](Seed from) {
+    anyAround(from.voxel.min, [&](std::uint64_t key) {
+      if (left.erase(key) > 0) touched.push_back({{unpacked(key), 1}, from.free_ns});
+      return false;
+    });
   };
-  for (const OccupiedLeaf& seed : seeds) anyAround(seed.min, take);
-  for (std::size_t i = 0; i < touched.size(); ++i) anyAround(unpacked(touched[i]), take);
+  std::size_t next = 0;
+  for (const Seed& seed : seeds) {
+    takeAround(seed);
+    for (; next < touched.size(); ++next) takeAround(touched[next]);
+  }
   return touched;
 }
 

@@ -17,18 +17,22 @@ namespace dccd {
 /// Not thread-safe.
 class Growth {
  public:
+  /// A voxel, and when it was last free.
+  struct Seed {
+    OccupiedLeaf voxel;
+    StampNs free_ns;
+  };
   /// It appeared out of reach, or is in doubt. free_ns: when it was last free; now_ns: of the map that shows it so.
   void add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns);
   /// Forgets what was free no later than `since_ns`, or was not occupied ever since it was added. now, before: what
   /// this map and the one before it show.
   void keep(const VoxelTree& now, const VoxelTree& before, StampNs since_ns, StampNs now_ns);
   /// Of what is kept the voxels that touch (26 neighbours) one of these, by whether they are in doubt, and belong to at
-  /// least GROUP that touch each other: one alone is a sensor's noise. keys: packed. free_ns: when the newest was free.
-  std::vector<OccupiedLeaf> beside(const std::vector<std::uint64_t>& keys, bool is_doubted, StampNs& free_ns) const;
-  /// Which of the voxels touch one of the seeds, or one that does; all where some were not kept.
-  std::vector<std::uint64_t> touched(const std::vector<std::uint64_t>& keys,
-                                     const std::vector<OccupiedLeaf>& seeds) const;
-  void clear();
+  /// least GROUP that touch each other: one alone is a sensor's noise. keys: packed.
+  std::vector<Seed> beside(const std::vector<std::uint64_t>& keys, bool is_doubted) const;
+  /// Which of the voxels touch one of the seeds, or one that does, and when the newest of these seeds was free; all
+  /// where some were not kept.
+  std::vector<Seed> touched(const std::vector<std::uint64_t>& keys, std::vector<Seed> seeds) const;
 
   static constexpr std::size_t MOST = std::size_t{1} << 18, GROUP = 4;
 
@@ -40,8 +44,7 @@ class Growth {
     StampNs free_ns, added_ns;
   };
   std::deque<Grown> grown_;
-  StampNs too_many_ns_ = NEVER_NS;  // of some that were not kept
-  bool misses_some_ = false;
+  StampNs too_many_ns_ = NEVER_NS;            // of some that were not kept
   std::unordered_set<std::uint64_t> voxels_;  // of grown_, packed
 
   bool isGroup(const VoxelKey& voxel) const;

@@ -27,8 +27,8 @@ void OwnVoxelFinder::forget() {
   stated_.clear();
   known_.clear();
   past_.clear();
-  unseen_.clear();
-  growth_.clear();
+  unseen_ = UnseenSpace();
+  growth_ = Growth();
   entered_.clear();
   remembered_.clear();
   seen_.clear();
@@ -64,7 +64,8 @@ void OwnVoxelFinder::listChanges(Look& look) {
   const KeyBox& region = look.mayBeNear() && before_ ? ALL_KEYS : look.region;
   const auto take = [&](const OccupiedLeaf& part) {
     const bool was_free = look.change.has_before && !unseen_.holds(part);
-    if (was_free && !isInside(part, region)) growth_.add(part, false, before_ns_, look.map.stamp_ns);
+    if (was_free && look.shows_growth && !isInside(part, region))
+      growth_.add(part, false, before_ns_, look.map.stamp_ns);
     visitVoxels(part, region, appeared);
   };
   visitDifference(now, before, [&](const OccupiedLeaf& fresh) {
@@ -122,7 +123,7 @@ void OwnVoxelFinder::appear(const ReachedCube& cube, Look& look) {
   VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
   const bool on_trust = look.trust_first && !cube.near.empty() && (!was_free || isNotYet(*cube.near.begin()));
   if (on_trust) state = VoxelState::OWN;
-  if ((was_free || was_seen) && state != VoxelState::OWN)
+  if (((was_free && look.shows_growth) || was_seen) && state != VoxelState::OWN)
     growth_.add(cube.leaf, state == VoxelState::DOUBT, before_ns_, look.map.stamp_ns);
   if (state == VoxelState::OBSTACLE) return;
   if (owners.empty()) owners = cube.near;
@@ -170,51 +171,56 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
 /// should memory end, the same map comes again.
 void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody>& bodies,
                                        const std::vector<BodyWay>& ways) {
-  std::vector<std::uint64_t> own;
+  std::vector<std::uint64_t> appeared;
   for (const Stated& voxel : look.appeared) {
-    if (voxel.state == VoxelState::OWN) own.push_back(packed(voxel.key));
+    if (voxel.state == VoxelState::OWN) appeared.push_back(packed(voxel.key));
+  }
+  std::vector<std::uint64_t> own = appeared;
+  for (const auto& [key, voxel] : stated_) {
+    if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
   }
   const StampNs now_ns = look.map.stamp_ns, since_ns = now_ns - nanoseconds(tolerance::OWN_GROWTH_S);
   growth_.keep(look.change.now, look.change.before, since_ns, now_ns);
-  StampNs free_ns = std::numeric_limits<StampNs>::min();  // what grew on goes by what it grew from
-  std::vector<OccupiedLeaf> seeds = growth_.beside(own, true, free_ns);
-  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
-    if (cube.near.empty()) seeds.push_back(cube.leaf);
+  std::vector<Growth::Seed> seeds = growth_.beside(appeared, true);
+  const std::vector<Growth::Seed> obstacles = growth_.beside(own, false);
+  std::vector<OccupiedLeaf> asked, outside;
+  for (const Growth::Seed& one : obstacles) asked.push_back(one.voxel);
+  const std::vector<ReachedCube> cubes = look.reached(asked, bodies, ways);
+  for (std::size_t i = 0; i < cubes.size(); ++i) {
+    if (!cubes[i].near.empty()) continue;
+    seeds.push_back(obstacles[i]);
+    outside.push_back(asked[i]);
   }
-  std::vector<std::uint64_t> grew = growth_.touched(own, seeds);
-  for (const std::uint64_t key : grew) growth_.add({unpacked(key), 1}, true, free_ns, now_ns);
-  std::sort(grew.begin(), grew.end());
+  std::unordered_set<std::uint64_t> grew;
+  for (const Growth::Seed& one : growth_.touched(appeared, std::move(seeds))) {
+    growth_.add(one.voxel, true, one.free_ns, now_ns);  // what grew on goes by what it grew from
+    grew.insert(packed(one.voxel.min));
+  }
   for (Stated& voxel : look.appeared) {
     const std::uint64_t key = packed(voxel.key);
-    if (std::binary_search(grew.begin(), grew.end(), key)) {
+    if (grew.count(key) > 0) {
       voxel.state = VoxelState::DOUBT;
       voxel.grew = true;
     }
     stated_[key] = voxel;
   }
   seen_alone_ = std::move(look.seen_alone);
-  listEntered(look, bodies, ways);
+  listEntered(look, bodies, std::move(outside));
 }
 
 /// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
-/// met voxels that were own before and so did not appear.
+/// met voxels that were own before and so did not appear. from: what grew out of reach beside own voxels.
 void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody>& bodies,
-                                 const std::vector<BodyWay>& ways) {
-  std::vector<std::uint64_t> own;
-  std::vector<OccupiedLeaf> from;
+                                 std::vector<OccupiedLeaf> from) {
+  std::unordered_set<std::uint64_t> left;
   for (const auto& [key, voxel] : stated_) {
-    if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
+    if (voxel.shown && voxel.state == VoxelState::OWN) left.insert(key);
     if (voxel.shown && voxel.state == VoxelState::DOUBT && voxel.grew) from.push_back({voxel.key, 1});
-  }
-  StampNs free_ns = 0;  // it is no matter when
-  for (const ReachedCube& cube : look.reached(growth_.beside(own, false, free_ns), bodies, ways)) {
-    if (cube.near.empty()) from.push_back(cube.leaf);
   }
   double reach_m = 0;
   for (const TrackedBody& body : bodies) reach_m = std::max(reach_m, body.reach_m);
   const double resolution_m = look.map.surface->resolution();
   entered_.clear();
-  std::unordered_set<std::uint64_t> left(own.begin(), own.end());
   for (double deep_m = -resolution_m; deep_m < reach_m && !from.empty(); deep_m += resolution_m) {
     std::vector<OccupiedLeaf> next;
     const auto enter = [&](std::uint64_t key) {
@@ -286,7 +292,6 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   std::size_t hidden = remembered_.size() + unseen_.size();
   for (const auto& one : stated_) hidden += one.second.shown ? 0 : 1;
   if (hidden > MOST_REMEMBERED) forget();
-
   const double since_s = before_ ? secondsBetween(before_ns_, map.stamp_ns) : 0;
   const bool is_blind = since_s < 0 || since_s > tolerance::OWN_PATH_S;
   Look look{map,
@@ -297,7 +302,8 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
             shapes_,
             trust_first,
             is_blind || since_s > tolerance::OWN_GAP_S,
-            is_blind};
+            is_blind,
+            past_.size() > 1};
   const std::vector<BodyWay> ways = waysOf(bodies, map.stamp_ns, lag_s);
   findSeams(look, bodies, lag_s);
   std::vector<TrackedBody> there;

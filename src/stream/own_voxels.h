@@ -91,7 +91,7 @@ class OwnVoxelFinder {
   void listLeftOut(Look& look) const;
   void askUnseen(Look& look, const std::vector<TrackedBody>& there, const std::vector<BodyWay>& ways_there);
   void stateWhatAppeared(Look& look, const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways);
-  void listEntered(const Look& look, const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways);
+  void listEntered(const Look& look, const std::vector<TrackedBody>& bodies, std::vector<OccupiedLeaf> from);
   /// Which maps came between the last one and this one, in words.
   std::string gapBefore(const ObstacleMap& map) const;
   /// The map without what is own or in doubt, with what is trusted.

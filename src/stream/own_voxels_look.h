@@ -19,6 +19,7 @@ struct OwnVoxelFinder::Look {
   RigidShapes& shapes;
   bool trust_first, is_gap;
   bool is_blind;                        // the gap is longer than any way that is known
+  bool shows_growth;                    // else what was free was so by one map alone: a sensor's first look
   std::set<int> seamed{}, not_yet{};    // bodies of which some of the way is not known; whose first frame is later
   std::set<int> lost{};                 // of which it was known, and is here no more but from the map before on
   std::map<int, BodySet> asked_with{};  // of each body: its group, what it holds or is held by

@@ -74,10 +74,7 @@ bool OwnVoxelFinder::Look::addBoxOf(const TrackedBody& body, const BodyWay& way)
   const Vec3 lo = reached.min().array() - more_m, hi = reached.max().array() + more_m;
   const KeyBox box = VoxelSurface::Impl::of(*map.surface).keysOf(lo.data(), hi.data());
   if (region.lo[0] > region.hi[0]) region = box;
-  for (std::size_t a = 0; a < 3; ++a) {
-    region.lo[a] = std::min(region.lo[a], box.lo[a]);
-    region.hi[a] = std::max(region.hi[a], box.hi[a]);
-  }
+  extend(region, box);
   if (not_yet.count(body.body) > 0) return false;
   boxes.push_back(box);
   return true;

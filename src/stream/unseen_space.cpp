@@ -28,11 +28,6 @@ bool MapChange::isFree(const OccupiedLeaf& part) const {
   return !known || coverage(*known, part) == VoxelTree::Coverage::FULL;
 }
 
-void UnseenSpace::clear() {
-  cubes_.clear();
-  tree_.reset();
-}
-
 bool UnseenSpace::holds(const OccupiedLeaf& voxel) {
   if (cubes_.empty()) return false;
   if (!tree_) tree_.emplace(cubes_);
@@ -56,12 +51,7 @@ std::vector<OccupiedLeaf> UnseenSpace::firstFree(const MapChange& change, const 
     });
   };
   KeyBox all = boxes.front();
-  for (const KeyBox& box : boxes) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      all.lo[a] = std::min(all.lo[a], box.lo[a]);
-      all.hi[a] = std::max(all.hi[a], box.hi[a]);
-    }
-  }
+  for (const KeyBox& box : boxes) extend(all, box);
   visitDifference(*change.known, change.known_before ? *change.known_before : nothing, takeFree, all);
   return fresh;
 }

@@ -24,7 +24,6 @@ struct MapChange {
 /// Not thread-safe.
 class UnseenSpace {
  public:
-  void clear();
   std::size_t size() const { return cubes_.size(); }
   /// As of the map before, from ask() up to keep(), too.
   bool holds(const OccupiedLeaf& voxel);

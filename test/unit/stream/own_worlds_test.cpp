@@ -329,6 +329,26 @@ TEST_F(OwnWorlds, AHandThatEntersOwnVoxelsIsNotTheCloths) {
   }
 }
 
+// A sensor's first look shows some of a table as free, and its second one does not: no hand has come.
+TEST_F(OwnWorlds, WhatTheFirstMapAloneShowsFreeHasNotGrown) {
+  const Cells table = cellsOf({0.001, 0.001, 0.001}, {0.3, 0.2, 0.019});
+  const Cells rim = cellsOf({0.141, 0.091, 0.021}, {0.179, 0.129, 0.039});
+  const Place above{{0.101, 0.051, 0.2}}, rests{{0.101, 0.051, 0.051}};
+  for (const StampNs step_ns : {33 * MS, 100 * MS, 500 * MS}) {
+    for (const int looks : {1, 2, 3}) {
+      start(0.005);
+      map(table);
+      for (int k = 1; k < looks; ++k) {
+        go(above, far_, step_ns);
+        map(table + above.cells());
+      }
+      go(rests, far_, step_ns);
+      map(table + rim + rests.cells());
+      EXPECT_EQ(isClear(go(rests, far_, step_ns)), looks == 1) << looks << ' ' << step_ns;
+    }
+  }
+}
+
 // A cup is seen below a cloth that sinks, too seldom for an obstacle while the cloth is out of reach: once it may be a
 // sensor's noise, twice it is there. A doubt of the map's maker, so that only its own octree tells it.
 TEST_F(OwnWorlds, WhatWasSeenTwiceWithNobodyNearIsNotTheCloths) {
