@@ -226,7 +226,7 @@ def edge_through_face(edge, face):
     if below == 0 and in_face(still, e, a, b, c) or above == 0 and in_face(still, f, a, b, c):
         return True
     if below * above > 0 or below == above:
-        return any(below == above == 0 and edges_meet(still, e, f, x, y) for x, y in ((a, b), (b, c), (c, a)))
+        return any(below == above == side(e, f, x, y) == 0 and edges_meet(still, e, f, x, y) for x, y in ((a, b), (b, c), (c, a)))
     turns = {side(e, f, x, y) for x, y in ((a, b), (b, c), (c, a))}
     return not {-1, 1} <= turns
 

@@ -120,6 +120,7 @@ void MeshSubscription::onObject(const TypedMesh& object) try {
   on_number_(message.number);
   heard(object.type->datatype);
   message.datatype = object.type->datatype;
+  message.sender = object.sender;
   message.object = object;
   callback_(std::move(message));
 } catch (const std::exception& error) {

@@ -14,7 +14,6 @@
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
 #include <ros/subscription_callback_helper.h>
-#include <ros/this_node.h>
 #include <boost/make_shared.hpp>
 
 #include "input/mesh_views.h"
@@ -28,7 +27,7 @@ struct MeshType;
 struct TypedMesh {
   const MeshType* type = nullptr;  ///< null: there is no object
   boost::shared_ptr<const void> message;
-  bool handed_over = false;  ///< by a publisher in this process
+  std::string sender = {};  ///< the publisher's name; this process's: it was handed over
 
   /// Null where the message is of another type.
   template <typename Message>
@@ -92,7 +91,7 @@ class ObjectReceiver : public ros::SubscriptionCallbackHelperT<const ros::Messag
  public:
   ObjectReceiver(const MeshType& type, MessageCount lost, const std::function<void(const TypedMesh&)>& callback)
       : Base([&type, callback](const Event& event) {
-          callback({&type, event.getConstMessage(), event.getPublisherName() == ros::this_node::getName()});
+          callback({&type, event.getConstMessage(), event.getPublisherName()});
         }),
         type_(type),
         lost_(std::move(lost)) {}

@@ -5,7 +5,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
 
 #include <ros/callback_queue.h>
 
@@ -14,19 +16,25 @@ namespace dccd {
 /// Messages of a topic that may wait in roscpp's own queue.
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 
-/// For subscriptions whose own queues hold `most` messages each or more. Callbacks are called by one thread.
+/// For subscriptions, each an owner, whose own queues hold `most` messages or more. Callbacks are called by one thread.
 class WatchedQueue : public ros::CallbackQueue {
  public:
-  explicit WatchedQueue(std::size_t most = SUBSCRIBER_QUEUE) : most_(most) {}
+  explicit WatchedQueue(std::size_t most = SUBSCRIBER_QUEUE) : waiting_(new Waiting{most}) {}
   void addCallback(const ros::CallbackInterfacePtr& callback, std::uint64_t owner = 0) override;
 
-  /// How often so many waited that a message that came then may have taken the place of another one.
+  /// How often so many of one waited that a message that came then may have taken the place of another one.
   std::uint64_t timesFull() const { return times_full_; }
-  bool isFull() const { return *waiting_ >= most_; }
+  bool isFull() const { return waiting_->full > 0; }
+
+  struct Waiting {
+    const std::size_t most;
+    std::atomic<std::size_t> full{0};  // owners of which `most` or more wait
+    std::mutex mutex;
+    std::map<std::uint64_t, std::size_t> of;  // by owner, above 0
+  };
 
  private:
-  std::size_t most_;
-  std::shared_ptr<std::atomic<std::size_t>> waiting_ = std::make_shared<std::atomic<std::size_t>>(0);
+  std::shared_ptr<Waiting> waiting_;
   std::atomic<std::uint64_t> times_full_{0};
 };
 

@@ -96,7 +96,7 @@ void CollisionMonitor::Impl::onMeshNumber(std::size_t body, std::uint64_t number
 
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
-  frames_handed_over += message.object.handed_over;
+  frames_handed_over += message.object.type && message.sender == ros::this_node::getName();
   message.number += mesh_lacks[body];  // numbers that are missing
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent. Own
   // voxels are followed by where the bodies were.

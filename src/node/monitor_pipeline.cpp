@@ -245,8 +245,11 @@ double MonitorPipeline::Source::hear(const DecodedMesh& mesh, const MeshMessage&
 
 void MonitorPipeline::Senders::hear(const std::string& sender) {
   if (sender.empty() || sender == last || in_turn) return;
-  in_turn = in_turn || sender == before;
+  constexpr std::size_t MOST_GONE = 64;  // a publisher may come each time under another name
+  in_turn = gone.count(sender) > 0;
+  if (gone.size() >= MOST_GONE) gone.clear();
   before = std::exchange(last, sender);
+  gone.insert(before);
 }
 
 void MonitorPipeline::hearMap(const std::string& topic, const std::string& frame_id, const std::string& sender) {

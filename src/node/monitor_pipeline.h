@@ -237,9 +237,10 @@ class MonitorPipeline {
   std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;         // a static body of which the monitor has a frame
   std::vector<std::uint64_t> came_;  // per body, the number of its last message
-  /// Who sent the messages of a topic: one that comes after another one, and did before, is the second of two.
+  /// Who sent the messages of a topic: one that comes after another one, and did before, is one of two.
   struct Senders {
     std::string last, before;
+    std::set<std::string> gone;  // all before the last
     bool in_turn = false;
     void hear(const std::string& sender);
     std::string problem(const std::string& what) const;

@@ -84,6 +84,9 @@ void PatchTracker::seam(std::size_t body) {
     at = living_.erase(at);
   }
   trace_.keep([&](const TouchGraph::Spot& spot, const Known&) { return !isOf(spot.body, body); });
+  for (std::size_t b = 0; b < looks_.size(); ++b) {
+    if (body == ALL || b == body) looks_[b] = {};
+  }
   if (body == ALL) has_last_ = false;
 }
 
@@ -120,10 +123,12 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
   merge(found.spots(), outcome);
   findParts(found, outcome);
   findNewVoxels(found, outcome);
+  findApart(outcome);
   findNews();
   keepIdentities(outcome);
   begin(outcome);
   remember(gap_s, outcome);
+  rememberLook(outcome);
   endWhatIsGone(outcome);
   name(outcome);
   tellNews(outcome);
@@ -149,6 +154,7 @@ void PatchTracker::takeBodies(const std::vector<Body>& bodies) {
     same = false;
     seam(b);
   }
+  looks_.resize(bodies.size());
   if (same) return;
   graph_.setBodies(bodies);
   for (TouchGraph::Spot& spot : trace_.spots) {
@@ -201,12 +207,13 @@ bool PatchTracker::wasCutOffAsExpected(const Part& part) const {
 }
 
 /// A patch is news once: in the step in which something unexpected of it touches for the first time. What touched
-/// already when it was first looked at is no news; what was expected until now is.
+/// already when it was first looked at is no news; what was seen apart before, or was expected until now, is.
 void PatchTracker::findNews() {
   for (Part& part : parts_) {
     const auto is_unexpected = [&](std::uint64_t id) { return living_.at(id).unexpected; };
     if (part.before.empty()) {
-      part.is_new = part.isUnexpected() && (!part.unexpected_initial || wasCutOffAsExpected(part));
+      const bool began = !part.unexpected_initial || part.apart_ns != UNKNOWN_NS;
+      part.is_new = part.isUnexpected() && (began || wasCutOffAsExpected(part));
     } else if (expectsOtherwise()) {  // what was expected may be what no longer is, also beside what never was
       part.is_new = part.isUnexpected() && !std::all_of(part.before.begin(), part.before.end(), is_unexpected);
     } else {
@@ -283,6 +290,30 @@ bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) con
   const Vec3 center(voxelPlane(leaf.voxel.x, resolution_m) + half, voxelPlane(leaf.voxel.y, resolution_m) + half,
                     voxelPlane(leaf.voxel.z, resolution_m) + half);
   return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
+}
+
+/// When parts that were none of a living patch were seen apart: since then no frames began anew, no voxel came, and
+/// nothing static was put elsewhere. So they came to touch, be it in a step that was cut or as noise grew.
+void PatchTracker::findApart(const Outcome& outcome) {
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (bodies[b].motion == BodyMotionKind::STATIC && bodies[b].t0 != looks_[b].at_rest) looks_[b] = {};
+  }
+  if (forgot_burst_) return;
+  for (Part& part : parts_) {
+    if (!part.touches || !part.before.empty() || part.map_changed) continue;
+    const auto [a, b] = part.body;
+    part.apart_ns = b == OBSTACLE_BODY ? looks_[a].map_ns : std::min(looks_[a].bodies_ns, looks_[b].bodies_ns);
+  }
+}
+
+void PatchTracker::rememberLook(const Outcome& outcome) {
+  const bool all = outcome.stats.unchecked_vertices + outcome.stats.unchecked_faces == 0;
+  for (std::size_t b = 0; b < looks_.size(); ++b) {
+    if (outcome.step->bodies[b].motion == BodyMotionKind::STATIC) looks_[b].at_rest = outcome.step->bodies[b].t1;
+    if (all && mesh_clock_.sees) looks_[b].bodies_ns = outcome.stamp_ns;
+    if (all && map_clock_.sees) looks_[b].map_ns = outcome.stamp_ns;
+  }
 }
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
@@ -391,7 +422,10 @@ void PatchTracker::begin(Outcome& outcome) {
     Living& living = living_[part->id];
     living.body = part->body;
     living.unexpected = part->unexpected_new || part->unexpected_initial;
-    if (part->initial) {
+    if (part->initial && part->apart_ns != UNKNOWN_NS) {
+      living.began_from_ns = std::min(part->apart_ns, outcome.start_ns);
+      living.began_to_ns = outcome.start_ns;
+    } else if (part->initial) {
       living.beginning = part->map_changed ? PatchBeginning::MAP_CHANGED : PatchBeginning::INITIAL;
       living.began_to_ns = outcome.start_ns;
     } else {

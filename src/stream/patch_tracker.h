@@ -84,6 +84,7 @@ class PatchTracker {
     double toc_lower = 1, toc_upper = 1;
     bool initial = false, map_changed = false;
     bool unexpected_new = false, unexpected_initial = false;  // something not expected: came in this step, was there
+    StampNs apart_ns = UNKNOWN_NS;  // of what is none of a living patch: all was looked at then, and it did not touch
     bool is_new = false;
     std::array<std::uint16_t, 2> body{0, 0};
     bool isUnexpected() const { return unexpected_new || unexpected_initial; }
@@ -94,6 +95,7 @@ class PatchTracker {
   void findParts(const PatchMaker& found, const Outcome& outcome);
   void findNewVoxels(const PatchMaker& found, const Outcome& outcome);
   bool isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) const;
+  void findApart(const Outcome& outcome);
   void keepIdentities(Outcome& outcome);
   void name(Outcome& outcome) const;
   void begin(Outcome& outcome);
@@ -103,6 +105,7 @@ class PatchTracker {
   void tellNews(Outcome& outcome) const;
   void goOn(const Outcome& outcome);
   void remember(double gap_s, const Outcome& outcome);
+  void rememberLook(const Outcome& outcome);
   bool changesHands(const Part& part) const;
   void askAllSpots();
   const Clock& clockOf(const std::array<std::uint16_t, 2>& body) const {
@@ -118,6 +121,12 @@ class PatchTracker {
   Trace trace_;
   std::uint64_t next_id_ = 1;
   Clock mesh_clock_, map_clock_;  // of what touches the map, the second
+  /// Of a body since its last seam.
+  struct Look {
+    StampNs bodies_ns = UNKNOWN_NS, map_ns = UNKNOWN_NS;  // until when all was looked at, of bodies, and of the map
+    std::shared_ptr<const Positions> at_rest;             // where it stood still
+  };
+  std::vector<Look> looks_;
   std::vector<Expectation> expected_;
   std::uint64_t expectations_ = 0, followed_expectations_ = 0;  // how often they changed: now, in the last step
   /// Partners of which a patch was all expected until a seam cut it off, and how often expectations had changed then.

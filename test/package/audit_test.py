@@ -578,6 +578,11 @@ class TouchesTest(unittest.TestCase):
                     asked, met = asked + 1, met + found
         self.assertGreater(min(met, asked - met), 100)
 
+    def test_an_edge_beside_a_face_without_an_area(self):
+        face = [(8, 0, -2), (11, -5, 1), (8, 0, -2)]
+        self.assertFalse(touches.edge_through_face([(9, -6, 0), (13, 0, 6)], face))
+        self.assertTrue(touches.edge_through_face([(8, -5, 1), (14, -5, 1)], face))
+
     def test_what_floating_point_rejects_does_not_meet(self):
         import numpy
         random = numpy.random.default_rng(7)

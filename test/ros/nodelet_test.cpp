@@ -68,7 +68,7 @@ TEST_F(Subscription, ToANamedTypeObjectsArriveFromTheSameProcess) {
   ASSERT_EQ(received.size(), sent.size());
   for (std::size_t i = 0; i < sent.size(); ++i) {
     EXPECT_EQ(address(i), sent[i].get()) << "message " << i;
-    EXPECT_TRUE(received[i].object.handed_over);
+    EXPECT_EQ(received[i].sender, ros::this_node::getName());
     EXPECT_EQ(received[i].number, i + 1);
   }
 }

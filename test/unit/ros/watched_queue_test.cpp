@@ -36,7 +36,7 @@ class Topic {
                  boost::make_shared<ros::MessageDeserializer>(helper_, object, boost::shared_ptr<ros::M_string>()),
                  false, ros::VoidConstWPtr(), false, ros::Time(), &was_full);
     dropped_ += was_full;
-    if (!was_full) callbacks_.addCallback(queue_, 1);
+    if (!was_full) callbacks_.addCallback(queue_, reinterpret_cast<std::uint64_t>(this));
   }
 
   int dropped() const { return dropped_; }
@@ -78,6 +78,16 @@ TEST_F(WatchedQueueTest, WhatIsTakenInTimeLacksNothing) {
   }
   EXPECT_EQ(topic.taken(), 300);
   EXPECT_EQ(topic.lacking(), 0);
+}
+
+// Two cameras that send at the same time are two subscriptions, each with room of its own.
+TEST_F(WatchedQueueTest, WhatWaitsOfAnotherTopicTakesNoRoom) {
+  WatchedQueue callbacks(ROOM);
+  Topic one("/left", callbacks), other("/right", callbacks);
+  for (std::uint32_t i = 1; i < ROOM; ++i) one.come(), other.come();
+  while (callbacks.callOne() == ros::CallbackQueue::Called) {
+  }
+  EXPECT_EQ(one.lacking() + other.lacking(), 0);
 }
 
 // A message that follows a dropped one is told of, however many come when: before a callback, or while it runs.

@@ -56,14 +56,15 @@ class Stream {
   }
   void wait(StampNs ns) { stamp_ns_ += ns; }
 
-  /// The next frame of each body, and what comes of it.
-  Outcome feed(const std::vector<Positions>& positions) {
+  /// The next frame of each body, and what comes of it. radius_m: of each vertex.
+  Outcome feed(const std::vector<Positions>& positions, double radius_m = 0) {
     stamp_ns_ += PERIOD_NS;
     for (std::size_t b = positions.size(); b-- > 0;) {
       MeshFrame frame;
       frame.stamp_ns = stamp_ns_;
       frame.topology = topologies_[b];
       frame.positions = positions[b];
+      if (radius_m > 0) frame.radius_m.assign(positions[b].size(), radius_m);
       monitor_->push(b, std::move(frame), 0);
     }
     Outcome outcome;

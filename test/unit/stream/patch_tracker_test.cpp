@@ -289,6 +289,82 @@ TEST(PatchTracker, AStepWithoutAnAnswerOrCutEndsNothing) {
   EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1");
 }
 
+// A cloth at rest above the table, and another one below: neither moves, and more noise makes them touch.
+TEST(PatchTracker, WhatWasSeenApartIsNewsWhereNoiseGrows) {
+  for (const bool is_seen_before : {true, false}) {
+    MonitorOptions options;
+    options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
+    Stream stream({grid(5, 5), grid(5, 5)}, options);
+    stream.setMap(table(0.05));
+    const auto feed = [&](double radius_m) {
+      const auto at = [](double z) { return strip(5, 5, 0.02, [z](std::size_t) { return z; }); };
+      return stream.feed({at(0.004), at(0.008)}, radius_m);
+    };
+    const double less_m = 0.001, more_m = 0.0045;
+    feed(is_seen_before ? less_m : more_m);
+    for (int k = 0; is_seen_before && k < 3; ++k) EXPECT_TRUE(feed(less_m).patches.empty());
+    const Outcome outcome = feed(more_m);
+    ASSERT_EQ(outcome.patches.size(), 2u) << "of the two, and of the lower one with the map";
+    for (const Patch& patch : outcome.patches) {
+      EXPECT_EQ(patch.initial, patch.contacts);
+      EXPECT_EQ(patch.is_new, is_seen_before);
+      EXPECT_EQ(patch.beginning, is_seen_before ? PatchBeginning::NEW : PatchBeginning::INITIAL);
+      EXPECT_EQ(patch.began_from_ns, is_seen_before ? outcome.start_ns : UNKNOWN_NS);
+      EXPECT_EQ(patch.began_to_ns, outcome.start_ns);
+    }
+    EXPECT_FALSE(feed(more_m).patches.at(0).is_new) << "once";
+  }
+}
+
+TEST(PatchTracker, WhatBeganInAStepThatWasCutIsNewsInTheNextThatIsNot) {
+  Stream stream({grid(5, 5), grid(5, 5)});
+  stream.setMap(table(0.05));
+  const auto feed = [&](double z) {
+    const auto at = [](double height) { return strip(5, 5, 0.02, [height](std::size_t) { return height; }); };
+    return stream.feed({at(z), at(z + 0.3)});
+  };
+  feed(0.01);
+  const Outcome whole = feed(0.01);
+  ASSERT_EQ(whole.status, StepStatus::OK);
+  const MonitorOptions before = stream.options();
+  stream.options().detector.step_budget_ms = 1e-6;
+  stream.monitor().setOptions(stream.options());
+  for (int k = 0; k < 3; ++k) ASSERT_EQ(feed(0).status, StepStatus::DEADLINE);
+  stream.monitor().setOptions(stream.options() = before);
+  const Outcome outcome = feed(0);
+  ASSERT_EQ(outcome.patches.size(), 1u);
+  EXPECT_TRUE(outcome.patches[0].is_new);
+  EXPECT_EQ(outcome.patches[0].began_from_ns, whole.stamp_ns);
+  EXPECT_EQ(outcome.patches[0].began_to_ns, outcome.start_ns);
+  EXPECT_FALSE(feed(0).patches.at(0).is_new) << "once";
+}
+
+// What stands still and is put elsewhere came to touch at a time that nobody knows, as a voxel does.
+TEST(PatchTracker, WhatStandsStillAndIsPutElsewhereIsNoNews) {
+  std::vector<Body> bodies(2);
+  bodies[0].name = "cloth", bodies[1].name = "plate", bodies[1].motion = BodyMotionKind::STATIC;
+  MonitorOptions options;
+  options.detector.patches = true;
+  Monitor monitor(options, bodies);
+  StampNs stamp_ns = 1000000000;
+  const auto push = [&](std::size_t body, double z) {
+    MeshFrame frame;
+    frame.stamp_ns = stamp_ns;
+    frame.topology = grid(5, 5);
+    frame.positions = strip(5, 5, 0.02, [z](std::size_t) { return z; });
+    monitor.push(body, std::move(frame), 0);
+  };
+  Outcome outcome;
+  for (int k = 0; k < 5; ++k, stamp_ns += PERIOD_NS) {
+    if (k == 0 || k == 3) push(1, k == 0 ? 0.3 : 0);
+    push(0, 0);
+    ASSERT_TRUE(monitor.next(0, outcome));
+    ASSERT_EQ(outcome.patches.size(), k < 3 ? 0u : 1u);
+    if (k == 3) EXPECT_EQ(outcome.patches[0].beginning, PatchBeginning::INITIAL);
+    if (k >= 3) EXPECT_FALSE(outcome.patches[0].is_new);
+  }
+}
+
 TEST(PatchTracker, WhatComesBackWithinTheGapIsTheSame) {
   for (const double gap_s : {0.0, 0.1, 1.0}) {
     MonitorOptions options;

@@ -39,6 +39,8 @@ TEST_F(TwoPublishers, InTurnTheyProveNothingUntilAReset) {
   EXPECT_TRUE(saidAfter({"/a", "/a"}).proved);
 }
 
+TEST_F(TwoPublishers, NorDoThree) { EXPECT_FALSE(saidAfter({"/a", "/b", "/c", "/a"}).proved); }
+
 TEST(TwoMapServers, InTurnTheyProveNothingUntilAReset) {
   Driven cell(scene());
   double now_s = 1;
