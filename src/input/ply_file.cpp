@@ -216,7 +216,8 @@ class PlyReader {
 
   /// Integers may be corners, in a list or one by one, whatever the element is called.
   void skip(const Element& element, PlyBody& body) {
-    const bool may_hold_faces = std::find(std::begin(NO_GEOMETRY), std::end(NO_GEOMETRY), element.name) == std::end(NO_GEOMETRY);
+    const bool may_hold_faces =
+        std::find(std::begin(NO_GEOMETRY), std::end(NO_GEOMETRY), element.name) == std::end(NO_GEOMETRY);
     std::uint64_t integers = 0, unread = 0;
     const auto take = [&](std::size_t p) {
       const Property& property = element.properties[p];

@@ -40,7 +40,7 @@ bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epo
     if (rigid.doubt.empty()) rigid.doubt = transforms_.doubtNextTo(fixed_frame_, rigid.frame, held_ns);
     rigid.frame_from_mesh = frame.pose;
     rigid.frame = fixed_frame_;
-    rigid.let_go_ns = NEVER;
+    rigid.let_go_ns = Rigid::NEVER;
     frame.carrier = carrierOf(rigid.frame, epoch);
   }
   frame.doubt = rigid.doubt;

@@ -23,8 +23,9 @@ constexpr std::size_t MAX_BODIES = 65534;
 enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1, EDGES = 2 };
 
 // The least bytes that one item of a list takes.
-constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, WAYPOINT_BYTES = 144, MAPS_WAYPOINT_BYTES = 136, CONTACT_BYTES = 51,
-                      INTERSECTION_BYTES = 25, EXPECTATION_BYTES = 32, PATCH_BYTES = 200, TEXT_BYTES = 4;
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, WAYPOINT_BYTES = 144, MAPS_WAYPOINT_BYTES = 136,
+                      CONTACT_BYTES = 51, INTERSECTION_BYTES = 25, EXPECTATION_BYTES = 32, PATCH_BYTES = 200,
+                      TEXT_BYTES = 4;
 
 template <typename Archive, typename Pose>
 void visitPose(Archive& a, Pose& pose) {

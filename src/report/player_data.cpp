@@ -253,9 +253,8 @@ void PlayerData::addVoxels(const Outcome& o, double from_s) {
     const Box box = boxOf(*body.t1);
     if (box.empty()) continue;
     for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 p = at_end * Vec3(corner & 1 ? box.max.x() : box.min.x(),
-                                                       corner & 2 ? box.max.y() : box.min.y(),
-                                                       corner & 4 ? box.max.z() : box.min.z());
+      const Vec3 p = at_end * Vec3(corner & 1 ? box.max.x() : box.min.x(), corner & 2 ? box.max.y() : box.min.y(),
+                                   corner & 4 ? box.max.z() : box.min.z());
       bodies.min = bodies.min.cwiseMin(p);
       bodies.max = bodies.max.cwiseMax(p);
     }

@@ -183,7 +183,8 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   answer(Question::CONTENTS, StepStatus::PARTIAL, takeUnchecked(step, outcome.stats));
   answer(Question::WAYS, StepStatus::PARTIAL, step.off_path);
   if (!step.map.way.empty() && !options.exclude_boxes.empty()) {
-    answer(Question::WAYS, StepStatus::PARTIAL, "the octomap's frame moves, and exclude_boxes do not; set fixed_frame to it");
+    answer(Question::WAYS, StepStatus::PARTIAL,
+           "the octomap's frame moves, and exclude_boxes do not; set fixed_frame to it");
   }
   // A list that is cut says nothing wrong about what touches, and all of it was looked at.
   if (outcome.contacts.size() < outcome.total_contacts) {

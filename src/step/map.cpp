@@ -132,8 +132,8 @@ bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>&
   }
   const Body& moving = part.step.bodies[b];
   const ObstacleMap& map = part.step.map;
-  ObstacleQuery query{*part.prepared.map.surface, *body.setup.topology,
-                      inMapFrame(map.map_from_fixed, *moving.t0, t0_), inMapFrame(map.fromFixedAt(1), *moving.t1, t1_)};
+  ObstacleQuery query{*part.prepared.map.surface, *body.setup.topology, inMapFrame(map.map_from_fixed, *moving.t0, t0_),
+                      inMapFrame(map.fromFixedAt(1), *moving.t1, t1_)};
   query.body = static_cast<std::uint16_t>(b);
   if (body.masked) {
     active_.assign(body.setup.topology->vertexCount(), 0);

@@ -153,9 +153,8 @@ Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margi
 
 Eigen::Isometry3d ObstacleMap::fromFixedAt(double u) const {
   if (way.empty() || u <= 0) return map_from_fixed;
-  const auto next = std::lower_bound(way.begin(), way.end() - 1, u, [](const Waypoint& point, double at) {
-    return point.u < at;
-  });
+  const auto next =
+      std::lower_bound(way.begin(), way.end() - 1, u, [](const Waypoint& point, double at) { return point.u < at; });
   const double from_u = next == way.begin() ? 0 : std::prev(next)->u;
   const Eigen::Isometry3d from = next == way.begin() ? map_from_fixed.inverse() : std::prev(next)->pose;
   return interpolate(from, next->pose, (u - from_u) / (next->u - from_u)).inverse();

@@ -301,8 +301,7 @@ bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
 }
 
 /// A map and a static body go where their frames do, as a rigid body does: of the map what is within the bounds.
-void Monitor::Impl::takeAlong(std::size_t b, std::uint64_t epoch, const Eigen::AlignedBox3d& bounds,
-                              Step& step) const {
+void Monitor::Impl::takeAlong(std::size_t b, std::uint64_t epoch, const Eigen::AlignedBox3d& bounds, Step& step) const {
   const bool is_map = b == bodies.size();
   MeshFrame held = is_map ? MeshFrame() : stores[b].newest();
   if (is_map) {

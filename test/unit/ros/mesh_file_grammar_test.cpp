@@ -658,7 +658,9 @@ TEST_F(PlyGrammar, ElementsThatMayHoldFaces) {
   ASSERT_EQ(mesh.hints.size(), 1u);
   EXPECT_TRUE(mentions(mesh.hints[0], "'poly' (3) is skipped, though its integers may be corners: unchecked"));
   const std::string one_by_one = "element triangle 2\nproperty int a\nproperty int b\nproperty int c\n";
-  EXPECT_EQ(read("a.ply", head(xyz() + faceElement() + one_by_one) + points() + faces() + "1 3 2\n0 1 3\n").uncheckedCount(), 2u);
+  EXPECT_EQ(
+      read("a.ply", head(xyz() + faceElement() + one_by_one) + points() + faces() + "1 3 2\n0 1 3\n").uncheckedCount(),
+      2u);
   const MeshFile both = read("a.ply", head(xyz() + faceElement(3) + "element poly 1\nproperty list uchar uint idx\n") +
                                           points() + faces() + "3 0 1 0\n3 1 3 2\n");
   EXPECT_EQ(both.uncheckedCount(), 1u) << "what repeats a corner lies in another face";
