@@ -19,7 +19,6 @@
 #include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
-#include "input/mesh_message.h"
 #include "input/transform_tracks.h"
 #include "node/attach_request.h"
 #include "node/carried.h"
