@@ -281,7 +281,7 @@ TEST_F(MapTracks, DistancesAreThoseOfAMapThatGoes) {
   options.detector.clearance.max_m = 2;
   rise(0.8);
   const Outcome outcome = last();
-  ASSERT_EQ(outcome.clearances.size(), 2u);
+  ASSERT_EQ(outcome.clearances.size(), 1u);
   const Clearance& row = outcome.clearances.back();
   ASSERT_EQ(row.body[1], OBSTACLE_BODY);
   EXPECT_LE(row.over_step.lower_m, 0.1);
