@@ -13,8 +13,8 @@ namespace {
 
 using ply::Element, ply::Encoding, ply::isInteger, ply::Number, ply::Property;
 
-/// Elements that are known to have none: a scanner's pixels, and what scanners and viewers say of a picture.
-constexpr std::string_view NO_GEOMETRY[] = {"range_grid", "camera", "material"};
+/// Elements of these names: a scanner's pixels, and what scanners and viewers say of a picture.
+constexpr std::string_view HOLD_NO_FACES[] = {"range_grid", "camera", "material"};
 
 std::size_t bytesOf(Number type) {
   static constexpr std::size_t BYTES[] = {1, 1, 2, 2, 4, 4, 4, 8};
@@ -217,7 +217,7 @@ class PlyReader {
   /// Integers may be corners, in a list or one by one, whatever the element is called.
   void skip(const Element& element, PlyBody& body) {
     const bool may_hold_faces =
-        std::find(std::begin(NO_GEOMETRY), std::end(NO_GEOMETRY), element.name) == std::end(NO_GEOMETRY);
+        std::find(std::begin(HOLD_NO_FACES), std::end(HOLD_NO_FACES), element.name) == std::end(HOLD_NO_FACES);
     std::uint64_t integers = 0, unread = 0;
     const auto take = [&](std::size_t p) {
       const Property& property = element.properties[p];

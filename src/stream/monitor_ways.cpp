@@ -278,7 +278,7 @@ bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
   for (const Knot& knot : knots) {
     if (!knot.why_unknown.empty()) {
       say(knot.why_unknown);
-      break;
+      return true;
     }
     if (knot.pose.matrix() == held.matrix()) continue;
     if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
