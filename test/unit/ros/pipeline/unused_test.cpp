@@ -377,6 +377,25 @@ TEST(Unused, AStaticBodyGoesWithItsFrameUnlessThatIsACamerasInANamedFixedFrame) 
   }
 }
 
+TEST(Unused, WhatACameraSawInALearntFixedFrameDoesNotGoWithTheCamera) {
+  for (const bool moves : {false, true}) {
+    Driven scene(
+        parameters("effects: {octomap: 'off'}, clock_body: cloth, bodies: {cloth: {topic: cloth}, table: "
+                   "{topic: table, motion: static, topology: {source: depth_image, stride: 1, max_edge_m: 1.0}}}"));
+    const auto step = [&](double at, double z) {
+      scene.tell({above("stand", z, after(at))});
+      if (at == 0) scene.take(1, cloudAt(after(at), 1, "stand"));
+      scene.take(0, cloudAt(after(at), 0));
+      EXPECT_TRUE(scene.pipeline.nextOutcome(PATIENCE_NS, scene.outcome));
+    };
+    step(0, 1);
+    step(0.04, 1);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    step(0.08, moves ? 1.5 : 1);
+    EXPECT_EQ(assuranceOf(scene.outcome).proved, !moves) << scene.outcome.reason;
+  }
+}
+
 // A question is held to all that a step is held to.
 TEST(Unused, AQuestionIsHeldToWhatCameAfterTheNewestFrames) {
   World world;
