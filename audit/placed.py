@@ -200,6 +200,13 @@ class Transforms:
             found |= {s.stamp for s in within}
         return sorted(found)
 
+    def moved(self, frame, fixed, stamp, start, end):
+        """Within the step, or since the stamp: what is held in the frame may be where it was then, within rigid_tolerance_m."""
+        try:
+            return not self.still(frame, fixed, min(stamp, start), max(stamp, end))
+        except Unknown:
+            return True
+
     def latest(self, frame, stamp):
         """The last stamp up to this one for which a sample of each joint above the frame has come."""
         while frame in self.samples and self.known(self.samples[frame]):
@@ -380,16 +387,9 @@ class Held(Stream):
 
     exact = Rigid.exact
 
-    @once
     def turns(self, start, end):
-        """Since its frame was stamped, too: the monitor may hold it where it was then, within rigid_tolerance_m."""
         frame = self.around(start, end)[0]
-        try:
-            return not self.transforms.still(frame.frame, self.fixed, min(start, frame.stamp), max(end, frame.stamp))
-        except NotSent:
-            return bool(self.knots(start, end))
-        except Unknown:
-            return True
+        return self.transforms.moved(frame.frame, self.fixed, frame.stamp, start, end)
 
     def loose(self, start, end):
         return not self.exact(start, end)
