@@ -313,6 +313,10 @@ void Monitor::Impl::takeAlong(std::size_t b, std::uint64_t epoch, const Eigen::A
   held.carrier.epoch = epoch;
   const std::vector<Knot> knots =
       tracks->between({}, held.carrier.frame, step.start_ns, step.stamp_ns, held.carrier.silence);
+  const std::string who = is_map ? "the octomap's frame" : "body '" + step.bodies[b].name + "'";
+  for (const Knot& knot : knots) {  // tf goes on while it is asked
+    if (!knot.why_unknown.empty()) return sayUnknown(who, knot.why_unknown, step);
+  }
   const auto at = [&](const Knot& knot, StampNs stamp_ns) {
     MeshFrame frame = held;
     frame.stamp_ns = stamp_ns;
@@ -325,7 +329,6 @@ void Monitor::Impl::takeAlong(std::size_t b, std::uint64_t epoch, const Eigen::A
   Body of_map;
   Body& body = is_map ? of_map : step.bodies[b];
   placeBetween(from, to, body);
-  const std::string who = is_map ? "the octomap's frame" : "body '" + body.name + "'";
   if (from != to && !follow(who, {{from, to, 0, 1}}, body, step)) sayUnknown(who, "nobody looked", step);
   if (!is_map) return;
   step.map.map_from_fixed = from->pose.inverse();
