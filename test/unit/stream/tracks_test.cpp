@@ -240,6 +240,7 @@ TEST_F(MapTracks, AMapGoesAsItsFrameDoes) {
     EXPECT_EQ(outcome.substeps == 1, height < 0.001) << "what stays within rigid_tolerance_m is no part";
     EXPECT_EQ(assuranceOf(outcome).clear(), height < 0.9);
     if (height < 0.9) continue;
+    ASSERT_FALSE(outcome.contacts.empty());
     const double toc = std::asin(std::sqrt(0.9 / height)) / M_PI;
     EXPECT_NEAR(outcome.earliest_toc, toc, 0.02);
     const ContactGeometry geometry = contactGeometry(outcome, outcome.contacts.front());
