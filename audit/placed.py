@@ -200,6 +200,20 @@ class Transforms:
             found |= {s.stamp for s in within}
         return sorted(found)
 
+    def moved(self, frame, fixed, stamp, start, end):
+        """Within the step, or since the stamp: what is held in the frame may be where it was then, within rigid_tolerance_m."""
+        try:
+            return not self.still(frame, fixed, min(stamp, start), max(stamp, end))
+        except Unknown:
+            return True
+
+    def latest(self, frame, stamp):
+        """The last stamp up to this one for which a sample of each joint above the frame has come."""
+        while frame in self.samples and self.known(self.samples[frame]):
+            newest = self.known(self.samples[frame])[-1]
+            frame, stamp = newest.parent, min(stamp, newest.stamp)
+        return stamp
+
     @once
     def still(self, frame, fixed, start, end):
         """Does the chain not move in the step? Only then is a straight way in it a straight way."""
@@ -334,12 +348,12 @@ class Rigid(Stream):
 
 
 class Held(Stream):
-    """A static body: its newest frame holds at all times, at the place that the frame's own stamp gives it."""
+    """A static body: its newest frame holds at all times, and goes along with the frame of reference that it came in."""
     moves = False
 
-    def __init__(self, *words, tolerance, timeout):
+    def __init__(self, *words, timeout):
         super().__init__(*words)
-        self.tolerance, self.timeout = tolerance, timeout
+        self.timeout = timeout
 
     @once
     def around(self, start, end):
@@ -357,29 +371,46 @@ class Held(Stream):
 
     @once
     def knots(self, start, end):
-        frame, t = self.around(start, end)[0], self.transforms
-        held = self.at(start, start, end)
         try:
-            knots = t.knots(frame.frame, self.fixed, start, end)
-            off = [np.abs(carried(t.pose(frame.frame, self.fixed, s), frame.positions) - held).max() for s in halves([start] + knots + [end])]
+            return self.transforms.knots(self.carrier(start, end), self.fixed, start, end)
         except NotSent:
             return []  # what is not sent any more counts as at rest
-        if max(off) > 2 * self.tolerance:
-            raise Unknown('tf has %s elsewhere in the step than where its frame was' % self.name)
-        return []
 
     @once
     def at(self, stamp, start, end):
-        frame = self.around(start, end)[0]
-        return carried(self.transforms.pose(frame.frame, self.fixed, frame.stamp), frame.positions)
+        frame, t = self.around(start, end)[0], self.transforms
+        try:
+            pose = t.pose(frame.frame, self.fixed, stamp)
+        except NotSent:
+            pose = t.pose(frame.frame, self.fixed, max(frame.stamp, t.latest(frame.frame, stamp)))
+        return carried(pose, frame.positions)
 
     exact = Rigid.exact
 
     def turns(self, start, end):
-        return False
+        frame = self.around(start, end)[0]
+        return self.transforms.moved(frame.frame, self.fixed, frame.stamp, start, end)
 
     def loose(self, start, end):
         return not self.exact(start, end)
+
+    loose_at_end = turns
+
+
+class OnMap:
+    """A body as it is seen from the map's frame, which may move."""
+
+    def __init__(self, track, frame):
+        self.track, self.transforms, self.frame, self.fixed = track, track.transforms, frame, track.fixed
+
+    def knots(self, start, end):
+        return self.track.knots(start, end) + self.transforms.knots(self.frame, self.fixed, start, end)
+
+    def turns(self, start, end):
+        return self.track.turns(start, end) or not self.transforms.still(self.frame, self.fixed, start, end)
+
+    def at(self, stamp, start, end):
+        return carried(self.transforms.pose(self.fixed, self.frame, stamp), self.track.at(stamp, start, end))
 
 
 def pieces(tracks, start, end, tolerance):

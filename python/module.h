@@ -37,6 +37,7 @@ std::string textOf(const Topology& mesh);
 struct Voxels {
   std::shared_ptr<const VoxelSurface> surface;
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();
+  std::vector<Waypoint> way{};  // of a step that was recorded
 };
 
 /// One body or a sequence of them. Those without a name are called body_0 and so on; each name must be another one.

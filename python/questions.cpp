@@ -203,7 +203,7 @@ py::tuple replayFile(const std::string& path, int threads) {
   py::list shown;
   for (const Body& body : bodies) shown.append(py::cast(named(body, bodies)));
   const ObstacleMap& map = recording.step.map;
-  const py::object voxels = map.surface ? py::cast(Voxels{map.surface, map.map_from_fixed}) : py::none();
+  const py::object voxels = map.surface ? py::cast(Voxels{map.surface, map.map_from_fixed, map.way}) : py::none();
   const py::object recorded =
       recording.has_answer ? py::cast(Answer(std::move(recording.answer))) : py::object(py::none());
   return py::make_tuple(Answer(std::move(result.answer)), recorded, result.differences, shown, voxels,

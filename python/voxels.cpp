@@ -100,6 +100,7 @@ ObstacleMap mapOf(py::handle voxels) {
   if (!py::isinstance<Voxels>(voxels)) throw py::type_error("voxels: expected dccd.Voxels or None");
   map.surface = voxels.cast<const Voxels&>().surface;
   map.map_from_fixed = voxels.cast<const Voxels&>().map_from_fixed;
+  map.way = voxels.cast<const Voxels&>().way;
   return map;
 }
 

@@ -37,6 +37,7 @@ struct Carrier {
   std::string frame;        ///< empty: the fixed frame itself
   std::uint64_t epoch = 0;  ///< FrameTracks::epoch() when it was placed
   Silence silence = Silence::UNKNOWN;
+  bool takes_along = true;  ///< what is static in it goes where it does; false: it was seen from there, and stays
 };
 
 /// Where frames of reference go. An empty name is the fixed frame's.

@@ -35,7 +35,7 @@ struct OwnVoxels {
 struct ObstacleMap {
   std::shared_ptr<const VoxelSurface> surface;
   StampNs stamp_ns = 0;
-  Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< at the map's stamp, held for the whole step
+  Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< when the step begins
   std::string frame_id;                                              ///< the name of its frame, for sentences
   std::string problem{};                                             ///< why there is none, for the reason of NO_MAP
   std::shared_ptr<const KnownSpace> known{};                         ///< what it has seen; null: it does not tell
@@ -45,6 +45,12 @@ struct ObstacleMap {
   /// one after the last.
   std::uint64_t number = 0;
   OwnVoxels own{};  ///< what was taken out of it
+  /// Where its frame goes from there, as that of a body that turns: fixed_from_map, ascending, the last one where the
+  /// step ends (u = 1). Empty: it stays.
+  std::vector<Waypoint> way{};
+
+  /// map_from_fixed at the fraction u of the step.
+  DCCD_EXPORT Eigen::Isometry3d fromFixedAt(double u) const;
 };
 
 struct Step {

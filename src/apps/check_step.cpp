@@ -316,7 +316,7 @@ std::vector<Step> stepsOf(const Arguments& a) {
   step.bodies[0].name = a.frames[0];
   step.bodies[0].topology = share(first.edges.empty() ? Topology::fromTriangles(first.positions.size(), first.faces)
                                                       : Topology::fromEdges(first.positions.size(), edgesOf(frames)));
-  step.bodies[0].dropped_faces = first.unchecked.size();
+  step.bodies[0].dropped_faces = first.uncheckedCount();
   step.bodies[0].t1 = share(first.positions);
   std::vector<Step> steps;
   for (std::size_t i = 1; i < frames.size(); ++i) {

@@ -139,6 +139,10 @@ void requireKnown(const XMLElement& at, std::initializer_list<std::string_view> 
   if (std::find(names.begin(), names.end(), at.Name()) == names.end()) refuse(at, "is not known where it stands");
 }
 
+void requireChildren(const XMLElement& at, std::initializer_list<std::string_view> names) {
+  for (auto* child = at.FirstChildElement(); child; child = child->NextSiblingElement()) requireKnown(*child, names);
+}
+
 /// One of a node; of what is none, the identity.
 Eigen::Affine3d transformOf(const XMLElement& at) {
   static const std::map<std::string_view, std::size_t> TRANSFORMS{
@@ -180,9 +184,11 @@ class DaeReader {
   void read() {
     const Eigen::Affine3d unit(Eigen::Scaling(ids_.metres(root_)));
     forChildren(root_, "scene", [&](const XMLElement& scene) {
+      requireChildren(scene, {"instance_visual_scene", "instance_physics_scene", "instance_kinematics_scene", "extra"});
       forChildren(scene, "instance_visual_scene", [&](const XMLElement& use) {
-        forChildren(ids_.find(use, "url", "visual_scene"), "node",
-                    [&](const XMLElement& node) { addNode(node, unit, 0); });
+        const XMLElement& visual = ids_.find(use, "url", "visual_scene");
+        requireChildren(visual, {"asset", "node", "evaluate_scene", "extra"});
+        forChildren(visual, "node", [&](const XMLElement& node) { addNode(node, unit, 0); });
       });
     });
   }
@@ -208,7 +214,9 @@ class DaeReader {
       refuse(use, "is not read; write the mesh where its skin or morph puts it");
     });
     forChildren(node, "instance_geometry", [&](const XMLElement& use) {
-      const XMLElement* mesh = onlyChild(ids_.find(use, "url", "geometry"), "mesh");
+      const XMLElement& geometry = ids_.find(use, "url", "geometry");
+      const XMLElement* mesh = onlyChild(geometry, "mesh");
+      if (mesh) requireChildren(geometry, {"asset", "mesh", "extra"});
       if (!mesh) refuse(use, "has the url '" + attribute(use, "url") + "', of a geometry without a <mesh>");
       for (auto* part = mesh->FirstChildElement(); part; part = part->NextSiblingElement()) addPrimitive(*part, pose);
     });
@@ -227,6 +235,7 @@ class DaeReader {
       return requireKnown(at, {"source", "vertices", "extra"});
     }
     forChildren(at, "ph", [](const XMLElement& ph) { refuse(ph, "is a polygon with holes; write it with triangles"); });
+    requireChildren(at, {"input", "vcount", "p", "extra"});
     std::vector<std::size_t> sizes;
     forChildren(at, "vcount", [&](const XMLElement& vcount) {
       forEachIndex(vcount, [&](std::size_t size) { sizes.push_back(size); });

@@ -35,6 +35,11 @@ bool mayBeThing(const MarkerView& marker) {
 
 }  // namespace
 
+std::size_t declaredBy(const MarkerView& marker) {
+  if (!isListOfPoints(marker)) return 1;
+  return marker.type == MARKER_TRIANGLE_LIST ? (marker.points.size + 2) / 3 : marker.points.size;
+}
+
 bool MeshDecoder::isWanted(const MarkerView& marker) const {
   return (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
          (!config_.marker_id || marker.id == *config_.marker_id) && marker.action == MARKER_ADD;
@@ -114,23 +119,24 @@ void MeshDecoder::tellUnread(const std::vector<MarkerView>& markers, const std::
     }
     return true;
   };
-  const auto tell = [&](const std::string& what, std::size_t faces) {
+  const auto tell = [&](const std::string& what) {
     if (mesh.unread_markers++ == 0) mesh.unread_marker = what;
-    mesh.dropped_faces += faces;
   };
   std::vector<const MarkerView*> things = taken;
   for (const MarkerView& marker : markers) {
     const bool by_choice = config_.source == TopologySource::POLYLINE && marker.type == MARKER_TRIANGLE_LIST;
     const bool is_taken = std::binary_search(taken.begin(), taken.end(), &marker);  // they are in their order
     mesh.has_others = mesh.has_others || (!isWanted(marker) && mayBeThing(marker));
-    if (!isWanted(marker) || !mayBeThing(marker) || by_choice || is_taken || isDrawnOfIt(marker)) continue;
+    if (!isWanted(marker) || !mayBeThing(marker) || by_choice || is_taken || isDrawnOfIt(marker)) {
+      mesh.census.account(declaredBy(marker));
+      continue;
+    }
     things.push_back(&marker);
-    tell(nameOf(marker) + ", type " + std::to_string(marker.type), marker.type == MARKER_TRIANGLE_LIST
-                                                                       ? (marker.points.size + 2) / 3
-                                                                       : std::max<std::size_t>(marker.points.size, 1));
+    tell(nameOf(marker) + ", type " + std::to_string(marker.type));
   }
   if (const ShownMarkers::Left left = shown_.show(things); left.count > 0) {
-    tell(left.example + ", which came before and was not deleted", left.count);
+    tell(left.example + ", which came before and was not deleted");
+    mesh.census.declare(left.count);
     mesh.unread_markers += left.count - 1;
   }
 }

@@ -22,6 +22,8 @@ inline bool isListOfPoints(const MarkerView& marker) {
   return isLineMarker(marker) || isPointMarker(marker) || marker.type == MARKER_CUBE_LIST ||
          marker.type == MARKER_TRIANGLE_LIST;
 }
+/// How many faces or points the marker carries; a shape of its own is one.
+std::size_t declaredBy(const MarkerView& marker);
 /// Without its scale: of lines and points that is how thick they are drawn. Throws WireError for a pose that is not
 /// finite.
 Eigen::Affine3d poseOf(const MarkerView& marker);

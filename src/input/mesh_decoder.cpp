@@ -14,6 +14,14 @@ namespace {
 // A tracker has fewer points than a quarter of the smallest depth camera has pixels.
 constexpr std::size_t LEAST_PICTURE = 160 * 120;
 
+std::size_t declaredBy(const CloudView& cloud) { return cloud.size(); }
+std::size_t declaredBy(const IndexedView& mesh) { return mesh.size() + mesh.triangles.size + mesh.polygons.size(); }
+std::size_t declaredBy(const std::vector<MarkerView>& markers) {
+  std::size_t count = 0;
+  for (const MarkerView& marker : markers) count += declaredBy(marker);
+  return count;
+}
+
 void requireSomething(const PolygonFaces& faces) {
   if (!faces.faces.empty()) return;
   refuseMessage("there is nothing to check: " +
@@ -85,7 +93,10 @@ DecodedMesh MeshDecoder::decode(const std::string& datatype, WireSpan<std::uint8
     if (config_.source == TopologySource::DEPTH_IMAGE && !std::holds_alternative<CloudView>(view)) {
       refuseMessage("topology/source depth_image is for the points of a depth camera, and " + datatype + " arrives");
     }
-    return std::visit([this](const auto& mesh) { return decodeView(mesh); }, view);
+    DecodedMesh mesh = std::visit([this](const auto& one) { return decodeView(one); }, view);
+    mesh.census.declare(std::visit([](const auto& one) { return declaredBy(one); }, view));
+    mesh.dropped_faces += mesh.census.unchecked();
+    return mesh;
   } catch (const WireError& error) {
     refuseMessage(datatype + ": " + error.what());
   } catch (const TopologyError& error) {
@@ -229,6 +240,7 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   mesh.topology = std::make_shared<const Topology>(Topology::fromTriangles(surface.positions.size(), surface.faces));
   mesh.positions = std::move(surface.positions);
   mesh.no_measurement = surface.no_measurement;
+  mesh.census.account(cloud.size());  // each is a vertex, no measurement, or between those of the stride
   addRadii(&cloud, mesh, &surface.pixel);
   return mesh;
 }
@@ -266,6 +278,7 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   }
   mesh.positions.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
+  mesh.census.account(mesh.positions.size());
   // Of a cloud of several rows and columns, each row is a rope.
   if (is_rope) takePolylines(cloud.width > 1 ? cloud.width : cloud.size(), mesh);
   addRadii(&cloud, mesh);
@@ -296,10 +309,13 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
       mesh.positions[i] = Vec3(p[0], p[1], p[2]);
     }
   }
+  mesh.census.account(count);
   if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
     if (!carries_faces) refuseMessage("the message has no triangles; set topology/source to grid, polyline or file");
     checkFaces(faceCount(view));
-    takeFaces(polygonsOf(view), mesh);
+    Polygons sent = polygonsOf(view);
+    mesh.census.account(sent.size());
+    takeFaces(std::move(sent), mesh);
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
     // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as
     // long.
@@ -316,10 +332,13 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
     mesh.topology = known_.topology;
     mesh.dropped_faces = known_.faces.unchecked.size();
     if (!known_.faces.unseen.empty()) takeFaces(known_.sent, mesh);
-  } else if (config_.source == TopologySource::POLYLINE) {
-    takePolylines(count, mesh);
   } else {
-    takeFixed(count, 0, 0, mesh);
+    mesh.census.account(view.triangles.size + view.polygons.size());  // the configuration has others
+    if (config_.source == TopologySource::POLYLINE) {
+      takePolylines(count, mesh);
+    } else {
+      takeFixed(count, 0, 0, mesh);
+    }
   }
   if (view.cloud) mesh.row_step_hint = rowStepHint(*view.cloud);
   addRadii(view.cloud ? &*view.cloud : nullptr, mesh);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dccd/mesh_store.h"
+#include "input/census.h"
 #include "input/depth_surface.h"
 #include "input/marker_names.h"
 #include "input/marker_ropes.h"
@@ -62,9 +63,10 @@ struct PassedOver : MeshError {
 /// A frame in the coordinates of the message's own frame; stamp_ns is 0 where the message has none.
 struct DecodedMesh : MeshFrame {
   std::string frame_id;
+  Census census;                   ///< of what the message carries; what of it is unchecked is in dropped_faces
   std::size_t weld_changes = 0;    ///< welded vertices whose corners came apart
   bool is_joined_anew = false;     ///< of other markers, or of another number of corners, than the mesh before
-  std::size_t unread_markers = 0;  ///< that are shown beside those that were taken, and not drawn of these: unchecked
+  std::size_t unread_markers = 0;  ///< that are shown beside those that were taken, and not drawn of these
   std::string unread_marker;       ///< the first of them: its name, and what it is
   bool has_others = false;         ///< beside it came what may be things, by names that are not the wanted ones
   std::size_t no_measurement = 0;  ///< pixels of a depth image that are none

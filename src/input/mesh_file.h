@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dccd/types.h"
+#include "input/census.h"
 #include "input/polygons.h"
 
 namespace dccd {
@@ -26,11 +27,14 @@ struct MeshFile {
   std::vector<Face> faces;             ///< as facesOf() makes them of the file's polygons
   FaceGroups groups;                   ///< of an OBJ
   Polygons polygons;                   ///< as the file has them
-  std::vector<std::size_t> unchecked;  ///< polygons that lie in no face; behind the last: what may be one
+  std::vector<std::size_t> unchecked;  ///< polygons that lie in no face
+  Census census;                       ///< of the file's statements, or the rows of its elements
   std::vector<Edge> edges;             ///< of ropes: lines of an OBJ, edges of a PLY, which then have no faces
   std::vector<std::string> hints;      ///< sentences about what was skipped, for the user to see
   bool is_soup = false;                ///< vertices are corners of equal coordinates, not what the file numbers
   std::function<std::string(std::size_t)> polygon_name;  ///< where a polygon stands in the file, in words
+
+  std::size_t uncheckedCount() const { return unchecked.size() + census.unchecked(); }
 };
 
 /// The small letters behind a path's last dot; empty where there is none.

@@ -56,7 +56,7 @@ MeshResource resourceOf(const std::string& path, double scale) {
     resource.topology =
         std::make_shared<const Topology>(mesh.edges.empty() ? Topology::fromTriangles(mesh.positions.size(), mesh.faces)
                                                             : Topology::fromEdges(mesh.positions.size(), mesh.edges));
-    resource.dropped_faces = mesh.unchecked.size();
+    resource.dropped_faces = mesh.uncheckedCount();
     resource.positions = std::move(mesh.positions);
     resource.file_faces = std::move(mesh.faces);
     resource.groups = std::move(mesh.groups);

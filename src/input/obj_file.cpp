@@ -37,7 +37,9 @@ class ObjReader {
 
   MeshFile read() {
     while (nextStatement()) {
-      if (!words_.empty()) take(words_[0]);
+      if (words_.empty()) continue;
+      mesh_.census.declare();
+      take(words_[0]);
     }
     endGroups();
     if (mesh_.positions.empty()) throw MeshFileError(path_ + ": no vertices");
@@ -47,8 +49,8 @@ class ObjReader {
     nameGroups(setPolygons(std::move(polygons_), mesh_));
     hintAtUnchecked([lines = std::move(face_lines_)](std::size_t p) { return "in line " + std::to_string(lines[p]); },
                     mesh_);
-    if (unknown_lines_ > 0) {
-      mesh_.hints.push_back(std::to_string(unknown_lines_) + " lines with unknown keywords are skipped, the first is " +
+    if (const std::size_t unknown = mesh_.census.unchecked(); unknown > 0) {
+      mesh_.hints.push_back(std::to_string(unknown) + " lines with unknown keywords are unchecked, the first is " +
                             first_unknown_);
     }
     return std::move(mesh_);
@@ -96,19 +98,19 @@ class ObjReader {
     if (keyword.text == "f") return readFace();
     if (keyword.text == "l") return readLine();
     if (keyword.text == "g") return readGroups();
-    if (isOneOf(NO_GEOMETRY, keyword.text)) return;
+    if (isOneOf(NO_GEOMETRY, keyword.text)) return mesh_.census.account();
     if (isOneOf(OTHER_GEOMETRY, keyword.text)) {
       lines_.fail(keyword, "carries geometry that is not read; write it as 'v' and 'f' or 'l' lines");
     }
     const std::string small = inSmallLetters(keyword.text);
     if (isOneOf(READ, small) || isOneOf(OTHER_GEOMETRY, small)) lines_.fail(keyword, "must be in small letters");
-    const bool is_first = mesh_.positions.empty() && polygons_.size() == 0 && unknown_lines_ == 0;
+    const bool is_first = mesh_.positions.empty() && polygons_.size() == 0 && first_unknown_.empty();
     if (decimalNumber(keyword.text)) {
       lines_.fail(keyword, is_first
                                ? "begins the first line, where an OBJ file has 'v', 'f' or 'l': it is of another format"
                                : "begins a line, and no line goes on with '\\' before it");
     }
-    if (unknown_lines_++ == 0) first_unknown_ = inQuotes(keyword.text) + " in line " + std::to_string(keyword.line);
+    if (first_unknown_.empty()) first_unknown_ = inQuotes(keyword.text) + " in line " + std::to_string(keyword.line);
   }
 
   /// x y z; then perhaps a weight, which must be 1, and a colour.
@@ -126,6 +128,7 @@ class ObjReader {
     }
     if (mesh_.positions.size() + 1 >= NO_INDEX) lines_.fail("too many vertices");
     mesh_.positions.emplace_back(value[0], value[1], value[2]);
+    mesh_.census.account();
   }
 
   void readFace() {
@@ -134,6 +137,7 @@ class ObjReader {
     for (std::size_t w = 1; w < words_.size(); ++w) corners_.push_back(cornerOf(words_[w], 3));
     polygons_.add(corners_);
     face_lines_.push_back(words_[0].line);
+    mesh_.census.account();
   }
 
   void readLine() {
@@ -146,6 +150,7 @@ class ObjReader {
       edge_lines_.push_back(words_[0].line);
       before = v;
     }
+    mesh_.census.account();
   }
 
   /// Beside faces a segment is a polygon of two corners: unchecked, unless a face has that edge.
@@ -188,6 +193,7 @@ class ObjReader {
   void readGroups() {
     endGroups();
     for (std::size_t w = 1; w < words_.size(); ++w) groups_.insert(std::string(words_[w].text));
+    mesh_.census.account();
   }
 
   /// The polygons since the last `g` are what its groups get.
@@ -220,7 +226,6 @@ class ObjReader {
   std::vector<Index> corners_;
   Index furthest_ = 0;  // of the vertices that were named before they came
   TextWord furthest_word_{{}, 0};
-  std::size_t unknown_lines_ = 0;
   std::string first_unknown_;
   std::set<std::string> groups_;  // of the faces since begin_
   std::size_t begin_ = 0;

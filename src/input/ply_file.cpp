@@ -13,6 +13,9 @@ namespace {
 
 using ply::Element, ply::Encoding, ply::isInteger, ply::Number, ply::Property;
 
+/// Elements of these names: a scanner's pixels, and what scanners and viewers say of a picture.
+constexpr std::string_view HOLD_NO_FACES[] = {"range_grid", "camera", "material"};
+
 std::size_t bytesOf(Number type) {
   static constexpr std::size_t BYTES[] = {1, 1, 2, 2, 4, 4, 4, 8};
   return BYTES[static_cast<std::size_t>(type)];
@@ -152,7 +155,7 @@ class PlyReader {
       const auto strip = std::upper_bound(strips.begin(), strips.end(), p) - strips.begin();
       return "a triangle of strip " + std::to_string(strip);
     };
-    addUnreadRows(name);
+    hintAtUnchecked(name, mesh_);
     return std::move(mesh_);
   }
 
@@ -202,6 +205,7 @@ class PlyReader {
   /// Calls take(p) for each property of each row, and after each row done().
   template <typename Take, typename Done>
   void forRows(const Element& element, PlyBody& body, Take take, Done done) {
+    mesh_.census.declare(element.count);
     for (std::uint64_t row = 0; row < element.count; ++row) {
       body.beginRow(rowName(element), row);
       for (std::size_t p = 0; p < element.properties.size(); ++p) take(p);
@@ -210,41 +214,25 @@ class PlyReader {
     }
   }
 
-  /// Integers in a list may be a face's corners, whatever the element is called. A scanner's grid is known to hold
-  /// pixels.
+  /// Integers may be corners, in a list or one by one, whatever the element is called.
   void skip(const Element& element, PlyBody& body) {
-    const bool may_hold_faces = element.name != "range_grid";
-    const std::size_t rows_before = unread_rows_.size();
-    std::uint64_t row = 0;
-    bool is_unread = false;
+    const bool may_hold_faces =
+        std::find(std::begin(HOLD_NO_FACES), std::end(HOLD_NO_FACES), element.name) == std::end(HOLD_NO_FACES);
+    std::uint64_t integers = 0, unread = 0;
     const auto take = [&](std::size_t p) {
       const Property& property = element.properties[p];
-      if (!property.count_type) return body.skip(property.type, 1);
-      const std::uint64_t count = countOf(property, body);
+      const std::uint64_t count = property.count_type ? countOf(property, body) : 1;
       body.skip(property.type, count);
-      is_unread = is_unread || (may_hold_faces && isInteger(property.type) && count > 0);
+      if (isInteger(property.type)) integers += property.count_type ? 2 * count : 1;
     };
     forRows(element, body, take, [&] {
-      if (std::exchange(is_unread, false)) unread_rows_.push_back({&element, row});
-      ++row;
+      const bool is_unread = may_hold_faces && std::exchange(integers, 0) > 1;
+      unread += is_unread;
+      mesh_.census.account(is_unread ? 0 : 1);
     });
     if (element.count == 0) return;
     mesh_.hints.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) + ") is skipped" +
-                          (unread_rows_.size() > rows_before ? ", though its lists of integers may be faces" : ""));
-  }
-
-  /// They are unchecked, as polygons that cannot be used are, and have the numbers after those of the polygons.
-  void addUnreadRows(const std::function<std::string(std::size_t)>& name_of_polygon) {
-    const std::size_t polygons = mesh_.polygons.size();
-    std::vector<std::string> names;
-    for (const UnreadRow& unread : unread_rows_) {
-      mesh_.unchecked.push_back(polygons + names.size());
-      names.push_back("row " + std::to_string(unread.row) + " of element " + inQuotes(unread.element->name));
-    }
-    const auto name = [name_of_polygon, polygons, names = std::move(names)](std::size_t p) {
-      return p < polygons ? name_of_polygon(p) : names[p - polygons];
-    };
-    hintAtUnchecked(name, mesh_);
+                          (unread > 0 ? ", though its integers may be corners: unchecked" : ""));
   }
 
   /// The place of the one property of one of these names.
@@ -269,7 +257,10 @@ class PlyReader {
       if (axis_of[p] < 0) return skipValue(element.properties[p], body);
       at[axis_of[p]] = body.number(element.properties[p].type);
     };
-    forRows(element, body, take, [&] { mesh_.positions.push_back(at); });
+    forRows(element, body, take, [&] {
+      mesh_.positions.push_back(at);
+      mesh_.census.account();
+    });
   }
 
   Index vertexOf(std::int64_t v, const PlyBody& body) const {
@@ -312,7 +303,7 @@ class PlyReader {
         polygons_.add(corners_);
       }
     };
-    forRows(element, body, take, [] {});
+    forRows(element, body, take, [&] { mesh_.census.account(); });
     if (!strips) faces_end_ = polygons_.size();
   }
 
@@ -335,6 +326,7 @@ class PlyReader {
       const Index a = vertexOf(vertex[0], body), b = vertexOf(vertex[1], body);
       if (a == b) body.fail("names vertex " + std::to_string(a) + " twice");
       mesh_.edges.push_back({std::min(a, b), std::max(a, b)});
+      mesh_.census.account();
     });
   }
 
@@ -348,11 +340,6 @@ class PlyReader {
   std::size_t faces_begin_ = 0, faces_end_ = 0;  // of the element `face` among the polygons
   std::vector<std::size_t> strip_ends_;          // of each strip among the polygons
   std::vector<Index> corners_;
-  struct UnreadRow {
-    const Element* element;
-    std::uint64_t row;
-  };
-  std::vector<UnreadRow> unread_rows_;  // of elements that are skipped
 };
 
 }  // namespace

@@ -19,14 +19,26 @@ namespace {
 
 constexpr std::size_t LEAST_TRANSFORM = 76;  // bytes of one without names
 
-/// As tf2 takes a name.
-std::string unslashed(const std::string& name) { return !name.empty() && name[0] == '/' ? name.substr(1) : name; }
+/// A name as tf2 takes it. Nearly all are taken as they are, and not copied.
+class Unslashed {
+ public:
+  explicit Unslashed(const std::string& name) : name_(name) {
+    if (hasSlash()) rest_ = name.substr(1);
+  }
+  const std::string& get() const { return hasSlash() ? rest_ : name_; }
+
+ private:
+  const std::string& name_;
+  std::string rest_;
+  bool hasSlash() const { return !name_.empty() && name_[0] == '/'; }
+};
 
 /// Of what tf2 would refuse with a line on the console, each time that it comes; empty: it can be used.
 std::string problemOf(const geometry_msgs::TransformStamped& transform) {
   const auto& p = transform.transform.translation;
   const auto& q = transform.transform.rotation;
-  const std::string child = unslashed(transform.child_frame_id), parent = unslashed(transform.header.frame_id);
+  const Unslashed child_name(transform.child_frame_id), parent_name(transform.header.frame_id);
+  const std::string &child = child_name.get(), &parent = parent_name.get();
   if (const std::string problem = frameNameProblem(child); !problem.empty()) return "child_frame_id: " + problem;
   if (const std::string problem = frameNameProblem(parent); !problem.empty()) return "frame_id: " + problem;
   if (child == parent) return "it is its own parent";
@@ -66,11 +78,9 @@ const std::string* TransformFeed::senderOf(const std::string& name) {
   return &*senders_.insert(senders_.size() < MAX_SENDERS || senders_.count(name) > 0 ? name : std::string()).first;
 }
 
-TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped& transform,
+TransformFeed::Jump TransformFeed::jumpOf(const Frame* frame, StampNs stamp_ns, const Sent& now,
                                           const std::string& sender) const {
-  const Frame* frame = frameOf(unslashed(transform.child_frame_id));
   if (!frame || frame->sent.empty()) return Jump::NONE;
-  const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
   const StampNs newest_ns = frame->sent.rbegin()->first;
   if (stamp_ns >= newest_ns) return Jump::NONE;  // nearly always: it is not looked for among thousands
   if (stamp_ns < newest_ns - JUMP_BACK_NS) {
@@ -80,7 +90,6 @@ TransformFeed::Jump TransformFeed::jumpOf(const geometry_msgs::TransformStamped&
   }
   const auto at_stamp = frame->sent.find(stamp_ns);
   if (at_stamp == frame->sent.end()) return Jump::NONE;
-  const Sent now{frameOf(unslashed(transform.header.frame_id)), poseOf(transform.transform)};
   if (isSame(at_stamp->second, now, tolerance::SAME_PLACE)) return Jump::NONE;
   return *at_stamp->second.sender == sender ? Jump::LOOP : Jump::TWO_SENDERS;
 }
@@ -165,18 +174,21 @@ void TransformFeed::clear() {
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static, const std::string& sender) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return !is_static && std::any_of(message.transforms.begin(), message.transforms.end(), [&](const auto& transform) {
-    return problemOf(transform).empty() && jumpOf(transform, sender) == Jump::LOOP;
+    if (!problemOf(transform).empty()) return false;
+    const Sent now{frameOf(Unslashed(transform.header.frame_id).get()), poseOf(transform.transform)};
+    return jumpOf(frameOf(Unslashed(transform.child_frame_id).get()),
+                  static_cast<StampNs>(transform.header.stamp.toNSec()), now, sender) == Jump::LOOP;
   });
 }
 
 void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem) {
   ++unusable_;
-  const std::string child = shortText(unslashed(transform.child_frame_id), MAX_NAME);
+  const std::string child = shortText(Unslashed(transform.child_frame_id).get(), MAX_NAME);
   const bool known = told_.count(child) > 0;
   if (!known && told_.size() >= MAX_TOLD) return;
   const std::string text = "transforms of '" + child + "' are left out: " + problem;
   // A frame that has had usable ones is not in want of a place.
-  const Frame* frame = frameOf(unslashed(transform.child_frame_id));
+  const Frame* frame = frameOf(Unslashed(transform.child_frame_id).get());
   if (!known && !(frame && frame->is_static)) only_unusable_[child] = text;
   if (told_.insert(child).second) problems_.push_back(text);
 }
@@ -229,21 +241,22 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
                         StampNs arrival_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   bool cleared = false;
+  const std::string& its_sender = *senderOf(sender);
   for (const auto& transform : message.transforms) {
     if (const std::string problem = problemOf(transform); !problem.empty()) {
       leaveOut(transform, problem);
       passOver(transform);
       continue;
     }
-    if (!only_unusable_.empty()) only_unusable_.erase(unslashed(transform.child_frame_id));
-    const Frame* parent = roomFor(unslashed(transform.header.frame_id));
-    Frame* frame = roomFor(unslashed(transform.child_frame_id));
+    if (!only_unusable_.empty()) only_unusable_.erase(Unslashed(transform.child_frame_id).get());
+    const Frame* parent = roomFor(Unslashed(transform.header.frame_id).get());
+    Frame* frame = roomFor(Unslashed(transform.child_frame_id).get());
     if (!parent || !frame) {
       passOver(transform);
       continue;
     }
     ++change_;
-    const Sent sent{parent, poseOf(transform.transform), senderOf(sender)};
+    const Sent sent{parent, poseOf(transform.transform), &its_sender};
     if (!frame->is_static) frame->is_static = is_static;
     if (*frame->is_static != is_static) {
       if (!isThere(*frame, sent)) dispute(transform, *frame);
@@ -256,8 +269,8 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       }
       frame->fixed = sent;
     } else {
-      const Jump jump = jumpOf(transform, *sent.sender);
       const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+      const Jump jump = jumpOf(frame, stamp_ns, sent, its_sender);
       frame->lead.add(stamp_ns, arrival_ns);
       const bool hides_later = jump != Jump::NONE && frame->sent.rbegin()->first <= stamp_ns + JUMP_BACK_NS;
       const bool is_full = kept_count_ >= max_kept_;
@@ -292,7 +305,7 @@ bool TransformFeed::isSame(const Sent& a, const Sent& b, double tolerance) {
 
 /// It came and is not used: where the frame was around its stamp nobody knows.
 void TransformFeed::passOver(const geometry_msgs::TransformStamped& transform) {
-  const auto known = frames_.find(unslashed(transform.child_frame_id));
+  const auto known = frames_.find(Unslashed(transform.child_frame_id).get());
   if (known == frames_.end()) return;
   Frame& frame = known->second;
   ++change_;

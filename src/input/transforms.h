@@ -161,7 +161,8 @@ class TransformFeed {
   Frame* roomFor(const std::string& name);
   const std::string* senderOf(const std::string& name);
   enum class Jump : std::uint8_t { NONE, LOOP, TWO_SENDERS };
-  Jump jumpOf(const geometry_msgs::TransformStamped& transform, const std::string& sender) const;
+  /// now: what is sent. frame: of which; null: of one that is not known.
+  Jump jumpOf(const Frame* frame, StampNs stamp_ns, const Sent& now, const std::string& sender) const;
   void forget(Frame& frame);
   void forgetAllOf(const std::string& sender);
   static bool isSame(const Sent& a, const Sent& b, double tolerance);

@@ -1,4 +1,5 @@
-// What the robot's hand holds: bodies whose contacts with it are expected, and objects that come and go as bodies.
+// What a phase expects, and what the robot's hand holds: bodies whose contacts with it are expected, and objects that
+// come and go as bodies.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -112,6 +113,23 @@ void MonitorPipeline::setHold(const std::string& body, const std::string& by, bo
     config_.holds = before;
     throw;
   }
+}
+
+void MonitorPipeline::setPhase(const std::string& phase) {
+  const std::vector<std::string> known = config_.phases();
+  if (!phase.empty() && std::find(known.begin(), known.end(), phase) == known.end()) {
+    throw ParameterError("phase '" + phase + "' is unknown; " + config_.phasesInWords());
+  }
+  expectNow(phase);
+  config_.phase = phase;
+}
+
+std::string MonitorPipeline::phaseInWords() const {
+  std::string text = config_.phase.empty() ? "no phase" : "phase '" + config_.phase + "'";
+  const std::vector<std::string> expected = describe(config_.monitor.detector.expected, monitor_->bodies());
+  if (expected.empty()) return text + ", no contact is expected";
+  for (std::size_t i = 0; i < expected.size(); ++i) text += (i == 0 ? ", expected: " : "; ") + expected[i];
+  return text;
 }
 
 /// What is expected in the phase, of what hands hold, and of what is attached; and what of that is not looked at.

@@ -177,7 +177,7 @@ std::set<std::string> MonitorPipeline::learntFramesInUse(const Step& step) const
   }
   for (std::size_t i = 0; i < attached_.size(); ++i) {
     const std::optional<Rigid>& rigid = rigid_[config_.bodies.size() + i];
-    if (attached_[i] && !attached_[i]->held && rigid->let_go_ns == NEVER) frames.insert(rigid->frame);
+    if (attached_[i] && !attached_[i]->held && rigid->let_go_ns == Rigid::NEVER) frames.insert(rigid->frame);
   }
   return frames;
 }

@@ -84,7 +84,7 @@ void MonitorPipeline::loadFiles() {
   }
 }
 
-MonitorPipeline::Rigid MonitorPipeline::rigidOf(const MeshResource& mesh) {
+Rigid MonitorPipeline::rigidOf(const MeshResource& mesh) {
   Rigid rigid;
   rigid.mesh.topology = mesh.topology;
   rigid.reference = mesh.positions;

@@ -12,7 +12,7 @@ namespace dccd {
 std::vector<CarriedBody> MonitorPipeline::carriedBodies() const {
   std::vector<CarriedBody> carried;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
-    if (!rigid_[b] || rigid_[b]->isNone() || rigid_[b]->frame == fixed_frame_ || rigid_[b]->let_go_ns != NEVER)
+    if (!rigid_[b] || rigid_[b]->isNone() || rigid_[b]->frame == fixed_frame_ || rigid_[b]->let_go_ns != Rigid::NEVER)
       continue;
     CarriedBody& one = carried.emplace_back();
     one.body = static_cast<std::uint16_t>(b);

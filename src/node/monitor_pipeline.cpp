@@ -47,23 +47,6 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, TransformFeed& transforms
     motion_.emplace(*config_.intent, config_.robot.description, config_.monitor.detector.rigid_tolerance_m);
 }
 
-void MonitorPipeline::setPhase(const std::string& phase) {
-  const std::vector<std::string> known = config_.phases();
-  if (!phase.empty() && std::find(known.begin(), known.end(), phase) == known.end()) {
-    throw ParameterError("phase '" + phase + "' is unknown; " + config_.phasesInWords());
-  }
-  expectNow(phase);
-  config_.phase = phase;
-}
-
-std::string MonitorPipeline::phaseInWords() const {
-  std::string text = config_.phase.empty() ? "no phase" : "phase '" + config_.phase + "'";
-  const std::vector<std::string> expected = describe(config_.monitor.detector.expected, monitor_->bodies());
-  if (expected.empty()) return text + ", no contact is expected";
-  for (std::size_t i = 0; i < expected.size(); ++i) text += (i == 0 ? ", expected: " : "; ") + expected[i];
-  return text;
-}
-
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
                            const std::string& reason) {
   const std::string text = shortText(reason);
@@ -130,12 +113,6 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     waiting.reason = std::move(waiting_[body]->reason);
   }
   waiting_[body] = std::move(waiting);
-}
-
-void MonitorPipeline::OtherMarkers::add(const PassedOver& message) {
-  ++messages;
-  newest = shortText(message.what());
-  may_be_things = may_be_things || message.may_be_things;
 }
 
 /// Again where something else is to be said of it than of the last one.
@@ -231,37 +208,10 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   return true;
 }
 
-double MonitorPipeline::Source::hear(const DecodedMesh& mesh, const MeshMessage& message) {
-  const StampNs before_ns = std::exchange(stamp_ns, mesh.stamp_ns);
-  if (before_ns > mesh.stamp_ns) lead = {};
-  lead.add(mesh.stamp_ns, message.receipt_ns);
-  senders.hear(message.sender);
-  if (frame != mesh.frame_id) frame = mesh.frame_id;
-  const std::size_t before = std::exchange(vertices, mesh.positions.size());
-  const bool has_others = before != 0 && before != vertices;
-  is_renumbered = is_renumbered || has_others || mesh.weld_changes > 0 || mesh.is_joined_anew;
-  return secondsBetween(mesh.stamp_ns, before_ns);
-}
-
-void MonitorPipeline::Senders::hear(const std::string& sender) {
-  if (sender.empty() || sender == last || in_turn) return;
-  constexpr std::size_t MOST_GONE = 64;  // a publisher may come each time under another name
-  in_turn = gone.count(sender) > 0;
-  if (gone.size() >= MOST_GONE) gone.clear();
-  before = std::exchange(last, sender);
-  gone.insert(before);
-}
-
 void MonitorPipeline::hearMap(const std::string& topic, const std::string& frame_id, const std::string& sender) {
   constexpr std::size_t MOST_VIEWS = 64;  // a publisher may make up a frame_id for each cloud
   const std::string view = frame_id.empty() ? topic : topic + " of frame '" + frame_id + "'";
   map_senders_[map_senders_.size() < MOST_VIEWS || map_senders_.count(view) > 0 ? view : topic].hear(sender);
-}
-
-std::string MonitorPipeline::Senders::problem(const std::string& what) const {
-  if (!in_turn) return "";
-  return what + " came in turn from two publishers, " + shortText(before) + " and " + shortText(last) +
-         ": which of them shows it is not known (~reset forgets both)";
 }
 
 StatsContext MonitorPipeline::counters() const {

@@ -19,34 +19,17 @@
 #include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
-#include "input/mesh_message.h"
 #include "input/transform_tracks.h"
 #include "node/attach_request.h"
+#include "node/carried.h"
 #include "node/effects.h"
 #include "node/frames_at_rest.h"
+#include "node/heard.h"
 #include "node/intended_motion.h"
+#include "node/loaded_map.h"
 #include "output/output_messages.h"
 
 namespace dccd {
-
-/// Clouds of one source that came and are not in the map, or in part: the octree is as if the sensor had not looked.
-struct MissedClouds {
-  std::uint64_t count = 0;
-  std::string newest{};  ///< why it is not
-};
-
-/// A decoded map in its own frame: map_from_fixed is not known yet. An empty frame_id is the fixed frame; without a
-/// stamp the latest transform is taken. One that is trusted, octomap_file's, is used together with a live one.
-struct LoadedMap : ObstacleMap {
-  std::string hint;                    ///< what looks like a mistake in what it was made of; empty: nothing does
-  std::string slow;                    ///< that its making takes too long, and what to do; empty: it does not
-  StampNs receipt_ns = 0;              ///< when what it was made of came, by the clock of stamps; 0: nobody knows
-  bool is_late = false;                ///< a map with a later stamp came before it
-  std::vector<MissedClouds> missed{};  ///< by MonitorConfig::clouds, since the start; empty: it does not tell
-  StampNs first_ns = 0;                ///< the earliest stamp of the clouds that it is made of; 0: of none
-  /// Of the clouds that it is made of: the frames by which they were placed, and TransformFeed::staticSince() then.
-  std::map<std::string, std::uint64_t> placed_by{};
-};
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one.
 using TopologyFilter =
@@ -195,20 +178,6 @@ class MonitorPipeline {
     bool told = false;     // the problem about it has been set
     std::string reason;    // why it has no place yet
   };
-  static constexpr StampNs NEVER = std::numeric_limits<StampNs>::max();
-  /// What tf carries.
-  struct Rigid {
-    MeshFrame mesh;       // as its file has it, but for
-    Positions reference;  // its positions
-    std::string name, frame;
-    Eigen::Isometry3d frame_from_mesh = Eigen::Isometry3d::Identity();
-    bool may_be_lost = false;               // others go on without it
-    bool lost = false;                      // it had no transform at the last frame
-    std::optional<Eigen::Isometry3d> pose;  // the last one
-    StampNs let_go_ns = NEVER;              // from then on it stays where the frame had it
-    std::string doubt;                      // why it may be elsewhere at all times, in words; empty: nothing says so
-    bool isNone() const { return reference.empty(); }
-  };
   struct Attached {
     AttachedObject object;
     bool held = true;
@@ -234,36 +203,11 @@ class MonitorPipeline {
   StampNs newest_ns_ = 0;                 // and the clock body's newest stamp then
   std::string changed_;                   // what it did
   Statement statement_;
-  std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
-  std::vector<bool> placed_;         // a static body of which the monitor has a frame
-  std::vector<std::uint64_t> came_;  // per body, the number of its last message
-  /// Who sent the messages of a topic: one that comes after another one, and did before, is one of two.
-  struct Senders {
-    std::string last, before;
-    std::set<std::string> gone;  // all before the last
-    bool in_turn = false;
-    void hear(const std::string& sender);
-    std::string problem(const std::string& what) const;
-  };
-  struct Source {
-    StampLead lead;
-    Senders senders;
-    std::size_t vertices = 0;                                // of the last frame
-    bool is_renumbered = false;                              // its vertices, since the first frame
-    StampNs stamp_ns = std::numeric_limits<StampNs>::min();  // of the last frame
-    std::string frame;                                       // of the last message
-    /// Of a frame; returns by how much its stamp is before that of the one before [s].
-    double hear(const DecodedMesh& mesh, const MeshMessage& message);
-  };
-  std::vector<Source> sources_;                 // per body
-  std::map<std::string, Senders> map_senders_;  // by topic and frame_id
-  /// By what the newest cloud of a depth camera was placed in a fixed frame that is named.
-  struct SeenFrom {
-    std::string frame;
-    StampNs stamp_ns = 0;
-    std::uint64_t epoch = 0;  // FrameTracks::epoch()
-    std::string doubt;        // why it may have been elsewhere, in words; once there is one it stays
-  };
+  std::vector<StampNs> widened_ns_;                 // per body, its last frame that widen() has seen; 0: none
+  std::vector<bool> placed_;                        // a static body of which the monitor has a frame
+  std::vector<std::uint64_t> came_;                 // per body, the number of its last message
+  std::vector<Source> sources_;                     // per body
+  std::map<std::string, Senders> map_senders_;      // by topic and frame_id
   std::vector<std::optional<SeenFrom>> seen_from_;  // per body
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
   std::vector<std::optional<Rigid>> rigid_;
@@ -305,13 +249,6 @@ class MonitorPipeline {
   FramesAtRest learnt_frames_;   // in which something is held, in the roots of their trees
   std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0, points_no_measurement_ = 0;
   bool resting_ = false;
-  struct OtherMarkers {
-    std::uint64_t messages = 0;
-    std::string newest;
-    bool may_be_things = false;
-    std::size_t unread = 0;  // beside the last mesh
-    void add(const PassedOver& message);
-  };
   std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;
 

@@ -40,7 +40,7 @@ bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epo
     if (rigid.doubt.empty()) rigid.doubt = transforms_.doubtNextTo(fixed_frame_, rigid.frame, held_ns);
     rigid.frame_from_mesh = frame.pose;
     rigid.frame = fixed_frame_;
-    rigid.let_go_ns = NEVER;
+    rigid.let_go_ns = Rigid::NEVER;
     frame.carrier = carrierOf(rigid.frame, epoch);
   }
   frame.doubt = rigid.doubt;
@@ -185,6 +185,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     // that was sent once: what is not sent is not elsewhere. A camera may move, and what it saw is where it was then.
     if (!config_.fixed_frame.empty()) done.mesh.carrier.silence = Silence::STANDS;
     const bool is_sensors = config_.bodies[body].input.source == TopologySource::DEPTH_IMAGE;
+    done.mesh.carrier.takes_along = !is_sensors;
     if (is_sensors && !config_.fixed_frame.empty()) {
       done.mesh.carrier.frame.clear();
       seen_from_[body] = SeenFrom{done.mesh.frame_id, done.mesh.stamp_ns, epoch, {}};

@@ -138,7 +138,7 @@ Marker MarkerDrawing::make(const std::string& ns, int type, double scale) const 
 
 Marker MarkerDrawing::makeInMap(const std::string& ns, int type, double scale) const {
   Marker marker = make(ns, type, scale);
-  marker.pose = tf2::toMsg(outcome.step->map.map_from_fixed.inverse());
+  marker.pose = tf2::toMsg(outcome.step->map.fromFixedAt(1).inverse());
   return marker;
 }
 

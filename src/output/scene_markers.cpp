@@ -26,7 +26,7 @@ void widen(Box& box, const Vec3& p) {
 Box boundsInMap(const Outcome& outcome) {
   Box box;
   for (const Body& body : outcome.step->bodies) {
-    for (const Vec3& p : *body.t1) widen(box, outcome.step->map.map_from_fixed * p);
+    for (const Vec3& p : *body.t1) widen(box, outcome.step->map.fromFixedAt(1) * p);
   }
   return box;
 }

@@ -345,9 +345,9 @@ class Explanation {
     const Body& moving = part.bodies[features_[0].body];
     const double inverse_resolution = 1 / step_.map.surface->resolution();
     std::optional<KeyLanes> keys;
-    for (const auto* positions : {moving.t0.get(), moving.t1.get()}) {
+    for (const bool at_end : {false, true}) {
       Positions moved;
-      const Positions& in_map = inMapFrame(part.map.map_from_fixed, *positions, moved);
+      const Positions& in_map = inMapFrame(part.map.fromFixedAt(at_end), at_end ? *moving.t1 : *moving.t0, moved);
       for (const Index v : features_[0].vertex) {
         const KeyLanes of_vertex = pointKeys(in_map[v], inverse_resolution, reach_m);
         if (keys) {

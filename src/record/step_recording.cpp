@@ -23,8 +23,9 @@ constexpr std::size_t MAX_BODIES = 65534;
 enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1, EDGES = 2 };
 
 // The least bytes that one item of a list takes.
-constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, WAYPOINT_BYTES = 144, CONTACT_BYTES = 51,
-                      INTERSECTION_BYTES = 25, EXPECTATION_BYTES = 32, PATCH_BYTES = 200, TEXT_BYTES = 4;
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, WAYPOINT_BYTES = 144, MAPS_WAYPOINT_BYTES = 136,
+                      CONTACT_BYTES = 51, INTERSECTION_BYTES = 25, EXPECTATION_BYTES = 32, PATCH_BYTES = 200,
+                      TEXT_BYTES = 4;
 
 template <typename Archive, typename Pose>
 void visitPose(Archive& a, Pose& pose) {
@@ -156,6 +157,23 @@ void visitBody(Archive& a, Body& body) {
     a.shared(point.positions);
   }
   if constexpr (Archive::READS) checkWaypoints(a, body);
+}
+
+template <typename Archive, typename Way>
+void visitMapsWay(Archive& a, Way& way) {
+  a.count(way, MAPS_WAYPOINT_BYTES);
+  double before = 0;
+  for (auto& point : way) {
+    a.number(point.u);
+    visitPose(a, point.pose);
+    if constexpr (Archive::READS) {
+      const bool is_last = &point == &way.back();
+      if (!(point.u > before && (is_last ? point.u == 1 : point.u < 1))) {
+        a.fail("the map's way has a pose at " + std::to_string(point.u) + " of the step");
+      }
+    }
+    before = point.u;
+  }
 }
 
 /// As Topology::polyline() makes it.
@@ -301,6 +319,7 @@ void visit(Archive& a, Recording& r) {
   a.map(r.step.map.surface);
   a.number(r.step.map.stamp_ns);
   visitPose(a, r.step.map.map_from_fixed);
+  visitMapsWay(a, r.step.map.way);
   auto& own = r.step.map.own;
   visitValues(a, r.step.map.problem, own.looked_at, own.own, own.doubted, own.excluded, own.doubt, r.has_answer);
   visitAnswer(a, r.answer);

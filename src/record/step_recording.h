@@ -18,7 +18,7 @@
 namespace dccd {
 
 /// Counts up with every change of the fields or their order. A file of another version is refused.
-constexpr std::uint32_t RECORDING_VERSION = 12;
+constexpr std::uint32_t RECORDING_VERSION = 13;
 
 /// A recording that cannot be read; the text names the input, the byte and the value.
 struct DCCD_EXPORT RecordingError : std::runtime_error {

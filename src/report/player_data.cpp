@@ -246,15 +246,15 @@ void PlayerData::addVoxels(const Outcome& o, double from_s) {
   const OwnVoxels& own = o.step->map.own;
   const bool is_empty = o.obstacle->leafCount() == 0 && own.own + own.doubted == 0;
   if (is_empty && voxels_.empty()) return;
+  const Eigen::Isometry3d at_end = o.step->map.fromFixedAt(1);
   Box bodies;
   for (const Body& body : o.step->bodies) {
     if (!body.t1 || !meetsMap(body)) continue;
     const Box box = boxOf(*body.t1);
     if (box.empty()) continue;
     for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 p = o.step->map.map_from_fixed * Vec3(corner & 1 ? box.max.x() : box.min.x(),
-                                                       corner & 2 ? box.max.y() : box.min.y(),
-                                                       corner & 4 ? box.max.z() : box.min.z());
+      const Vec3 p = at_end * Vec3(corner & 1 ? box.max.x() : box.min.x(), corner & 2 ? box.max.y() : box.min.y(),
+                                   corner & 4 ? box.max.z() : box.min.z());
       bodies.min = bodies.min.cwiseMin(p);
       bodies.max = bodies.max.cwiseMax(p);
     }
@@ -262,7 +262,7 @@ void PlayerData::addVoxels(const Outcome& o, double from_s) {
   if (bodies.empty()) return;
   const bool is_inside = !looked_at_.empty() && (looked_at_.min.array() <= bodies.min.array()).all() &&
                          (bodies.max.array() <= looked_at_.max.array()).all();
-  if (o.obstacle == surface_ && own.voxels == own_ && is_inside) return;
+  if (o.obstacle == surface_ && own.voxels == own_ && is_inside && o.step->map.way.empty()) return;
   const double resolution_m = o.obstacle->resolution();
   const double beyond_m = 0.5 * (bodies.max - bodies.min).norm() + 4 * resolution_m;
   looked_at_ = {bodies.min.array() - beyond_m, bodies.max.array() + beyond_m};
@@ -272,7 +272,7 @@ void PlayerData::addVoxels(const Outcome& o, double from_s) {
     ++maps_left_out_;
     return;
   }
-  Voxels voxels{from_s, resolution_m, o.step->map.map_from_fixed.inverse(), {}, {}, {}, true};
+  Voxels voxels{from_s, resolution_m, at_end.inverse(), {}, {}, {}, true};
   voxels.all &= takeNearest(o.obstacle->leaves(), resolution_m, bodies, looked_at_, voxels.leaves);
   voxels.all &= takeNearest(leavesOf(own, false), resolution_m, bodies, looked_at_, voxels.own);
   voxels.all &= takeNearest(leavesOf(own, true), resolution_m, bodies, looked_at_, voxels.doubted);

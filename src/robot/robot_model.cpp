@@ -71,7 +71,7 @@ class RobotMaker {
       if (!isLeftOut(link)) miss("not watched: " + shape);
     }
     for (const auto& link : urdf.model->links_) {
-      if (!isLeftOut(link.first)) addLink(*link.second, urdf.refused[link.first]);
+      if (!isLeftOut(link.first)) addLink(*link.second, urdf.refused[link.first], urdf.collisions[link.first]);
     }
     hintAtSurfaces(urdf);
     return std::move(robot_);
@@ -121,7 +121,10 @@ class RobotMaker {
     return std::find(robot_.left_out.begin(), robot_.left_out.end(), link) != robot_.left_out.end();
   }
 
-  void addLink(const urdf::Link& link, const std::vector<std::string>& refused) {
+  /// declared: how many collision elements the description has of it.
+  void addLink(const urdf::Link& link, const std::vector<std::string>& refused, std::size_t declared) {
+    const std::size_t missing = robot_.missing.size();
+    std::size_t accounted = 0;
     for (const std::string& problem : refused) miss("link '" + link.name + "' is not watched: " + problem);
     if (link.collision_array.empty() && refused.empty()) bare_.push_back(link.name);
     for (std::size_t i = 0; i < link.collision_array.size(); ++i) {
@@ -132,15 +135,21 @@ class RobotMaker {
       }
       if (isPoint(*link.collision_array[i])) {
         robot_.excluded.push_back(what + ", a sphere of radius 0");
+        ++accounted;
         continue;
       }
       try {
         MeshResource mesh = meshOf(*link.collision_array[i], config_.scaleOf(link.name), what);
         robot_.parts.push_back(
             {link.name, i == 0 ? link.name : link.name + "/" + number, std::make_shared<const MeshResource>(mesh)});
+        ++accounted;
       } catch (const std::exception& error) {  // also urdfdom's, of a geometry that it did not read
         miss(what + " is not watched: " + error.what());
       }
+    }
+    if (accounted < declared && robot_.missing.size() == missing) {
+      miss("link '" + link.name + "' is not watched: " + std::to_string(accounted) + " of its " +
+           std::to_string(declared) + " collision elements were read");
     }
   }
 

@@ -123,6 +123,7 @@ std::size_t reduceLink(XMLElement& link, UrdfText& urdf) {
     }
     if (tag != "collision" || !problem.empty()) link.DeleteChild(child);
   }
+  urdf.collisions[name] = number;
   if (seen && number == 0) urdf.visual_only.insert(name);
   return kept;
 }

@@ -24,7 +24,8 @@ struct UrdfText {
   std::map<std::string, std::vector<std::string>> refused;
   /// Shapes that are of no link's elements: the link in which they stand, or none, and a clause.
   std::vector<std::pair<std::string, std::string>> unread;
-  std::set<std::string> visual_only;  ///< links that are seen, but have no collision element
+  std::map<std::string, std::size_t> collisions;  ///< of each link, as the text has them
+  std::set<std::string> visual_only;              ///< links that are seen, but have no collision element
 };
 
 /// Visuals, inertias, materials, transmissions, what is Gazebo's, and how joints move are left out before urdfdom reads

@@ -134,7 +134,8 @@ std::string waysInWords(const Step& step) {
       text << (text.str().empty() ? "" : ", ") << "body '" << body.name << "' was seen up to " << off_m
            << " m off the way from the step's start to its end";
   }
-  return text.str().empty() ? "a rigid body turns far" : text.str();
+  if (!text.str().empty()) return text.str();
+  return step.map.way.empty() ? "a rigid body turns far" : "the octomap's frame moves far";
 }
 
 /// Why there was not time, or room, for all of it; empty: there was.
@@ -181,6 +182,10 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   };
   answer(Question::CONTENTS, StepStatus::PARTIAL, takeUnchecked(step, outcome.stats));
   answer(Question::WAYS, StepStatus::PARTIAL, step.off_path);
+  if (!step.map.way.empty() && !options.exclude_boxes.empty()) {
+    answer(Question::WAYS, StepStatus::PARTIAL,
+           "the octomap's frame moves, and exclude_boxes do not; set fixed_frame to it");
+  }
   // A list that is cut says nothing wrong about what touches, and all of it was looked at.
   if (outcome.contacts.size() < outcome.total_contacts) {
     say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +

@@ -41,11 +41,11 @@ void keepFirst(bool cells, std::vector<Contact>& contacts) {
   contacts.erase(std::remove_if(contacts.begin(), contacts.end(), late), contacts.end());
 }
 
-/// How often the step is to be cut for the bodies that turn or have waypoints, and how many these are.
+/// How often the step is to be cut for a map that moves and bodies that turn or have waypoints, and how many these are.
 std::size_t countParts(const Step& step, const Options& options, const SceneArrays& scene, StepStats& stats) {
   const auto turning = std::count_if(step.bodies.begin(), step.bodies.end(),
                                      [](const Body& body) { return body.turns || !body.waypoints.empty(); });
-  if (turning == 0) return 1;
+  if (turning == 0 && step.map.way.empty()) return 1;
   const Clock::time_point start = Clock::now();
   const std::size_t needed = neededParts(step, options.rigid_tolerance_m, scene.bodies());
   stats[Effect::RIGID_BODIES] = {static_cast<std::uint64_t>(turning), 0, msSince(start)};

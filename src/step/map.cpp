@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
@@ -13,20 +14,27 @@ namespace dccd {
 namespace {
 
 /// Whether the body comes so near to what is occupied that their bounds, in the map's frame, tell nothing. Those of its
-/// records along x, y and z, over the whole step, are placed as inMapFrame() places a vertex. Either is off by some ten
-/// half ulps of the size of its terms, of which the slack is thousands.
+/// records along x, y and z, over the whole step, are placed as inMapFrame() places a vertex, by the map's pose at
+/// either end: straight ways stay within what holds both. Each is off by some ten half ulps of the size of its terms,
+/// of which the slack is thousands.
 bool boundsReach(const SceneBody& body, const ObstacleMap& map, const Box& occupied, double distance_m) {
+  const Eigen::Isometry3d at_end = map.fromFixedAt(1);
   for (int axis = 0; axis < 3; ++axis) {
-    double lo = map.map_from_fixed.translation()[axis], hi = lo, size = std::abs(lo) + distance_m;
-    for (int from = 0; from < 3; ++from) {
-      const double factor = map.map_from_fixed.linear()(axis, from);
-      const double a = factor * body.bounds_min[from], b = factor * body.bounds_max[from];
-      lo += std::min(a, b);
-      hi += std::max(a, b);
-      size += std::max(std::abs(a), std::abs(b));
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const Eigen::Isometry3d* pose : {&map.map_from_fixed, &at_end}) {
+      double lo = pose->translation()[axis], hi = lo, size = std::abs(lo) + distance_m;
+      for (int from = 0; from < 3; ++from) {
+        const double factor = pose->linear()(axis, from);
+        const double a = factor * body.bounds_min[from], b = factor * body.bounds_max[from];
+        lo += std::min(a, b);
+        hi += std::max(a, b);
+        size += std::max(std::abs(a), std::abs(b));
+      }
+      const double reach = distance_m + tolerance::LENGTH * size;
+      least = std::min(least, lo - reach);
+      most = std::max(most, hi + reach);
     }
-    const double reach = distance_m + tolerance::LENGTH * size;
-    if (lo - reach > occupied.max[axis] || hi + reach < occupied.min[axis]) return false;
+    if (least > occupied.max[axis] || most < occupied.min[axis]) return false;
   }
   return true;
 }
@@ -47,7 +55,7 @@ const MapAnswer* takeAnswer(std::size_t b, const Part& part, std::vector<MapAnsw
   if (b >= known.size() || !part.options().keep_bounds) return nullptr;
   MapAnswer& answer = known[b];
   const bool same = part.scene.bodies()[b].unchanged && answer.map && answer.map == part.prepared.map.surface &&
-                    answer.pose == part.step.map.map_from_fixed.matrix();
+                    answer.pose == part.step.map.map_from_fixed.matrix() && part.step.map.way.empty();
   if (!same) answer = MapAnswer();
   return same ? &answer : nullptr;
 }
@@ -55,7 +63,7 @@ const MapAnswer* takeAnswer(std::size_t b, const Part& part, std::vector<MapAnsw
 /// What moves has other contacts in the next step: they are kept of what has not moved once already.
 void keepAnswer(std::size_t b, const Part& part, const std::vector<Contact>& contacts, std::size_t first,
                 std::uint64_t pairs, std::vector<MapAnswer>& known) {
-  if (!part.scene.bodies()[b].unchanged || !part.options().keep_bounds) return;
+  if (!part.scene.bodies()[b].unchanged || !part.options().keep_bounds || !part.step.map.way.empty()) return;
   known.resize(part.scene.bodies().size());
   known[b] = {part.prepared.map.surface,
               part.step.map.map_from_fixed.matrix(),
@@ -123,9 +131,9 @@ bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>&
     checks_[b] = std::make_unique<ObstacleCheck>(o);
   }
   const Body& moving = part.step.bodies[b];
-  const Eigen::Isometry3d& map_from_fixed = part.step.map.map_from_fixed;
-  ObstacleQuery query{*part.prepared.map.surface, *body.setup.topology, inMapFrame(map_from_fixed, *moving.t0, t0_),
-                      inMapFrame(map_from_fixed, *moving.t1, t1_)};
+  const ObstacleMap& map = part.step.map;
+  ObstacleQuery query{*part.prepared.map.surface, *body.setup.topology, inMapFrame(map.map_from_fixed, *moving.t0, t0_),
+                      inMapFrame(map.fromFixedAt(1), *moving.t1, t1_)};
   query.body = static_cast<std::uint16_t>(b);
   if (body.masked) {
     active_.assign(body.setup.topology->vertexCount(), 0);

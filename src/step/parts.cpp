@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include "dccd/mesh_store.h"
 #include "dccd/tolerances.h"
@@ -150,6 +151,15 @@ Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margi
 
 }  // namespace
 
+Eigen::Isometry3d ObstacleMap::fromFixedAt(double u) const {
+  if (way.empty() || u <= 0) return map_from_fixed;
+  const auto next =
+      std::lower_bound(way.begin(), way.end() - 1, u, [](const Waypoint& point, double at) { return point.u < at; });
+  const double from_u = next == way.begin() ? 0 : std::prev(next)->u;
+  const Eigen::Isometry3d from = next == way.begin() ? map_from_fixed.inverse() : std::prev(next)->pose;
+  return interpolate(from, next->pose, (u - from_u) / (next->u - from_u)).inverse();
+}
+
 double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
   const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
   return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
@@ -195,6 +205,42 @@ double leavesWayBy(const Body& body, double pose_scale, std::size_t parts) {
   }
   const double arc = body.turns ? sagitta(radius, turnBetween(body, pose_scale, parts)) : 0;
   return (offParts(body, parts) + arc + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
+}
+
+double leavesWayOnMap(const Step& step, const Body& body, std::size_t parts, double most_m) {
+  if (step.map.way.empty() || !meetsMap(body)) return 0;
+  const double count = static_cast<double>(parts);
+  std::vector<double> at;
+  for (std::size_t part = 0; part <= parts; ++part) at.push_back(static_cast<double>(part) / count);
+  for (const Waypoint& point : step.map.way) at.push_back(point.u);
+  for (const Waypoint& point : body.waypoints) at.push_back(point.u);
+  std::sort(at.begin(), at.end());
+  const auto onMap = [&](double u) {
+    Positions placed = placedAt(step.pose_scale, body, u);
+    const Eigen::Isometry3d map_from_fixed = step.map.fromFixedAt(u);
+    for (Vec3& p : placed) p = map_from_fixed * p;
+    return placed;
+  };
+  double off = 0, largest = 0;
+  std::size_t next = 1;
+  Positions from, to = onMap(0);
+  for (std::size_t part = 0; part < parts; ++part) {
+    const double from_u = static_cast<double>(part) / count, to_u = static_cast<double>(part + 1) / count;
+    from = std::exchange(to, onMap(to_u));
+    for (; next < at.size() && at[next] <= to_u; ++next) {
+      for (const double u : {(at[next - 1] + at[next]) / 2, at[next]}) {
+        if (at[next - 1] == at[next] || u == to_u) continue;
+        const Positions there = onMap(u);
+        const double s = (u - from_u) * count;
+        for (std::size_t v = 0; v < there.size(); ++v) {
+          off = std::max(off, (there[v] - ((1 - s) * from[v] + s * to[v])).norm());
+          largest = std::max(largest, there[v].cwiseAbs().maxCoeff());
+        }
+        if (off > most_m) return off;
+      }
+    }
+  }
+  return (off + tolerance::CLEARANCE * largest) * (1 + tolerance::CLEARANCE);
 }
 
 std::shared_ptr<const Positions> placesAt(const Body& body, const Waypoint& point) {
@@ -249,9 +295,12 @@ std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<
   };
   // What more parts need for another body may leave this one's bends where fewer met them.
   const auto fits = [&](double parts) {
+    const auto count = static_cast<std::size_t>(parts);
     return std::all_of(step.bodies.begin(), step.bodies.end(), [&](const Body& body) {
-      return body.waypoints.empty() || !isNear(static_cast<std::size_t>(&body - step.bodies.data())) ||
-             leavesWayBy(body, 1, static_cast<std::size_t>(parts)) <= tolerance_m;
+      const bool is_straight = body.waypoints.empty() ||
+                               !isNear(static_cast<std::size_t>(&body - step.bodies.data())) ||
+                               leavesWayBy(body, 1, count) <= tolerance_m;
+      return is_straight && leavesWayOnMap(step, body, count, tolerance_m) <= tolerance_m;
     });
   };
   double parts = 1;
@@ -270,6 +319,10 @@ std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<
 
 void advance(const Step& step, std::size_t part, std::size_t parts, Step& at) {
   const double u = static_cast<double>(part) / static_cast<double>(parts);
+  if (!step.map.way.empty()) {
+    at.map.map_from_fixed = step.map.fromFixedAt(static_cast<double>(part - 1) / static_cast<double>(parts));
+    at.map.way = {{1, step.map.fromFixedAt(u).inverse()}};
+  }
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     const Body& body = step.bodies[b];
     Body& moved = at.bodies[b];

@@ -26,6 +26,10 @@ double partsFor(const Body& body, double pose_scale, double tolerance_m, const E
 /// what placing them rounds included; 0 of one that goes straight.
 double leavesWayBy(const Body& body, double pose_scale, std::size_t parts);
 
+/// The same of its way as it is seen from a map that moves, by its samples, those of the map and the middles between
+/// any two; 0 where the map stays, or the two are not tested. Once it is more than most_m it is not looked at further.
+double leavesWayOnMap(const Step& step, const Body& body, std::size_t parts, double most_m);
+
 /// How far a body's places are from the ways between others [m]. Vertices that are not finite are not compared.
 class WayBends {
  public:
@@ -72,7 +76,7 @@ inline std::size_t partsAllowed(std::size_t needed, std::size_t most) {
 std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before = {},
                         double apart_m = 0);
 
-/// Moves `at`, which ends where part `part` - 1 of `parts` equal parts ends, on by one part.
+/// Moves `at`, which ends where part `part` - 1 of `parts` equal parts ends, and its map, on by one part.
 void advance(const Step& step, std::size_t part, std::size_t parts, Step& at);
 
 /// One vertex at the end of the first `part` of `parts` equal parts, as advance() has it.

@@ -38,7 +38,7 @@ class LeavingPlanes {
     partner_ = pair.body[pair.body[0] == mover_];
     follow(path, *path.find(mover_), most_s);
     const bool on_map = partner_ == OBSTACLE_BODY;
-    if (on_map) to_map_ = outcome.step->map.map_from_fixed;
+    if (on_map) to_map_ = outcome.step->map.fromFixedAt(1);
     double largest = 1;
     Eigen::AlignedBox3d before, all;
     for (End& end : ends_) {

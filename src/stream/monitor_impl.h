@@ -117,14 +117,15 @@ struct Monitor::Impl {
   std::shared_ptr<const MeshFrame> frameAt(std::size_t body, StampNs stamp_ns, Step& step) const;
   bool findPlaces(const MeshStore::Stretch& stretch, const Step& step, const Body& body, std::vector<Waypoint>& places,
                   std::string& why) const;
-  /// The body's waypoints; stretches: its frames in and around the step, oldest first. False: they leave some of it
-  /// open.
-  bool follow(std::size_t body, const std::vector<MeshStore::Stretch>& stretches, Step& step) const;
+  /// The body's waypoints; `who`, in words; stretches: its frames in and around the step, oldest first. False: they
+  /// leave some of it open.
+  bool follow(const std::string& who, const std::vector<MeshStore::Stretch>& stretches, Body& body, Step& step) const;
   /// Says of the step what came of the body between the stamps and was not used.
   void lookForUnused(std::size_t body, StampNs from_ns, StampNs to_ns, Step& step) const;
   /// The same of what is held where it was placed once: static bodies and the map. epoch: of the step's first frame.
   void lookAtHeld(std::uint64_t epoch, Shown& shown, Step& step) const;
   bool lookAtHeld(std::size_t body, std::uint64_t epoch, Step& step) const;
+  void takeAlong(std::size_t body, std::uint64_t epoch, const Eigen::AlignedBox3d& bounds, Step& step) const;
   void sayUnshown(const Shown& shown, Step& step) const;
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();

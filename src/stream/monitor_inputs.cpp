@@ -93,13 +93,13 @@ Step Monitor::Impl::place(const Pending& pending) {
     }
     if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
       placeBetween(pending.from, pending.to, body);
-      shown[b] = follow(b, {{pending.from, pending.to, 0, 1}}, step);
+      shown[b] = follow("body '" + body.name + "'", {{pending.from, pending.to, 0, 1}}, body, step);
     } else {
       placeBetween(frameAt(b, step.start_ns, step), frameAt(b, step.stamp_ns, step), body);
       lookBetween(b, step);
       auto stretches = stores[b].pathWithin(step.start_ns + 1, step.stamp_ns - 1);
       std::reverse(stretches.begin(), stretches.end());
-      shown[b] = follow(b, stretches, step);
+      shown[b] = follow("body '" + body.name + "'", stretches, body, step);
     }
     stores[b].forgetBefore(wayNeededFrom(b, step.stamp_ns));
   }

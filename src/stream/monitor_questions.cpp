@@ -77,6 +77,10 @@ Outcome Monitor::predict() {
   step.stamp_ns = step.start_ns + static_cast<StampNs>(std::llround(m.options.look_ahead_s * 1e9));
   step.sequence = 0;
   step.map = m.usableMap(step.start_ns);
+  const ObstacleMap& before_map = m.last->map;
+  if (step.map.frame_id == before_map.frame_id && !before_map.way.empty()) {
+    step.map.map_from_fixed = before_map.fromFixedAt(1);
+  }
   step.pose_scale = ahead;
   for (Body& body : step.bodies) {
     const Positions &before = *body.t0, &now = *body.t1;

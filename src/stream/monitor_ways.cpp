@@ -31,13 +31,16 @@ double apart(const Eigen::Isometry3d& seen, const Eigen::Isometry3d& expected, c
   return off;
 }
 
+/// Of all of its places in the step that are known.
 Eigen::AlignedBox3d boundsOf(const Body& body) {
   Eigen::AlignedBox3d bounds;
-  for (const Positions* positions : {body.t0.get(), body.t1.get()}) {
-    for (const Vec3& p : *positions) {
-      if (p.allFinite()) bounds.extend(p);
+  forEachLeg(body, [&](const Positions& from, const Positions& to, double) {
+    for (const Positions* positions : {&from, &to}) {
+      for (const Vec3& p : *positions) {
+        if (p.allFinite()) bounds.extend(p);
+      }
     }
-  }
+  });
   return bounds;
 }
 
@@ -203,8 +206,8 @@ bool Monitor::Impl::findPlaces(const MeshStore::Stretch& stretch, const Step& st
 
 /// Between two frames of a mesh its vertices go straight in the frame that carries it, and that one as tf has it; a
 /// rigid body is carried as it is. Where that leaves the way from the step's start to its end, it becomes waypoints.
-bool Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>& stretches, Step& step) const {
-  Body& body = step.bodies[b];
+bool Monitor::Impl::follow(const std::string& who, const std::vector<MeshStore::Stretch>& stretches, Body& body,
+                           Step& step) const {
   std::vector<Waypoint> waypoints, places;
   const auto add = [&](const Waypoint& place) {
     if (place.u > 0 && place.u < 1 && (waypoints.empty() || place.u > waypoints.back().u)) waypoints.push_back(place);
@@ -215,7 +218,7 @@ bool Monitor::Impl::follow(std::size_t b, const std::vector<MeshStore::Stretch>&
     known_ns = stretch.to->stamp_ns;
     std::string why;
     if (!findPlaces(stretch, step, body, places, why)) {
-      sayUnknown("body '" + body.name + "'", why, step);
+      sayUnknown(who, why, step);
       return true;
     }
     for (std::size_t k = 1; k + 1 < places.size(); ++k) add(places[k]);
@@ -275,7 +278,7 @@ bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
   for (const Knot& knot : knots) {
     if (!knot.why_unknown.empty()) {
       say(knot.why_unknown);
-      break;
+      return true;
     }
     if (knot.pose.matrix() == held.matrix()) continue;
     if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
@@ -283,11 +286,54 @@ bool Monitor::Impl::lookAtHeld(std::size_t b, std::uint64_t epoch, Step& step) c
                                    : apart(knot.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
   }
   if (off_m <= options.detector.rigid_tolerance_m) return true;
+  // What is own of a map is told from where bodies were to it, one pose a map.
+  if (is_map ? tracked().empty() : frame->carrier.takes_along) {
+    bounds.min().array() -= off_m;
+    bounds.max().array() += off_m;
+    takeAlong(b, epoch, bounds, step);
+    return true;
+  }
   std::ostringstream text;
   text << name() << " was seen up to " << off_m << " m from where it was at its stamp; "
        << (is_map ? "set fixed_frame to it" : "send it again, or set fixed_frame to what is at rest");
   addSentence(step.off_path, text.str());
   return true;
+}
+
+/// A map and a static body go where their frames do, as a rigid body does: of the map what is within the bounds.
+void Monitor::Impl::takeAlong(std::size_t b, std::uint64_t epoch, const Eigen::AlignedBox3d& bounds, Step& step) const {
+  const bool is_map = b == bodies.size();
+  MeshFrame held = is_map ? MeshFrame() : stores[b].newest();
+  if (is_map) {
+    held.pose = step.map.map_from_fixed.inverse();
+    held.carrier.frame = step.map.frame_id;
+    for (const Vec3& corner : cornersOf(bounds)) held.positions.push_back(corner);
+  }
+  held.rigid = true;
+  held.carrier.epoch = epoch;
+  const std::vector<Knot> knots =
+      tracks->between({}, held.carrier.frame, step.start_ns, step.stamp_ns, held.carrier.silence);
+  const std::string who = is_map ? "the octomap's frame" : "body '" + step.bodies[b].name + "'";
+  for (const Knot& knot : knots) {  // tf goes on while it is asked
+    if (!knot.why_unknown.empty()) return sayUnknown(who, knot.why_unknown, step);
+  }
+  const auto at = [&](const Knot& knot, StampNs stamp_ns) {
+    MeshFrame frame = held;
+    frame.stamp_ns = stamp_ns;
+    frame.pose = knot.pose;
+    for (Vec3& p : frame.positions) p = knot.pose * (held.pose.inverse() * p);
+    return share(std::move(frame));
+  };
+  const auto from = at(knots.front(), step.start_ns);
+  const auto to = step.start_ns == step.stamp_ns ? from : at(knots.back(), step.stamp_ns);
+  Body of_map;
+  Body& body = is_map ? of_map : step.bodies[b];
+  placeBetween(from, to, body);
+  if (from != to && !follow(who, {{from, to, 0, 1}}, body, step)) sayUnknown(who, "nobody looked", step);
+  if (!is_map) return;
+  step.map.map_from_fixed = from->pose.inverse();
+  step.map.way = std::move(body.waypoints);
+  if (from != to) step.map.way.push_back({1, to->pose});
 }
 
 }  // namespace dccd

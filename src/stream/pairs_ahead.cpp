@@ -45,6 +45,8 @@ std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<Speed
     };
     require(bounds[b].max_m_s, "max_m_s");
     require(bounds[b].last_step_factor, "last_step_factor");
+    const Body& body = outcome.step->bodies[b];
+    if (body.motion == BodyMotionKind::STATIC && body.turns) bounds[b] = {};  // its frame takes it along
   }
   return bounds;
 }
@@ -91,7 +93,12 @@ double distanceOf(const Outcome& outcome, const Insides& insides, const Clearanc
 Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
   Speeds speeds;
   for (const std::uint16_t body : pair.body) {
-    if (body == OBSTACLE_BODY) continue;
+    if (body == OBSTACLE_BODY) {
+      if (outcome.step->map.way.empty()) continue;  // it stays
+      speeds.unbounded = "octomap";
+      speeds.other = SpeedBound::NONE;
+      continue;
+    }
     double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
     if (!std::isfinite(bounds[body].max_m_s)) speeds.unbounded = outcome.step->bodies[body].name;
     sum = sum == 0 ? bounds[body].max_m_s : roundedUp(sum + bounds[body].max_m_s);

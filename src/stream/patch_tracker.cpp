@@ -281,7 +281,7 @@ void PatchTracker::findNewVoxels(const PatchMaker& found, const Outcome& outcome
     }
   }
   last_map_ = outcome.obstacle;
-  last_map_pose_ = outcome.step->map.map_from_fixed;
+  last_map_pose_ = outcome.step->map.fromFixedAt(1);
 }
 
 bool PatchTracker::isNewOnMap(const PatchLeaf& leaf, const Outcome& outcome) const {

@@ -87,7 +87,7 @@ Eigen::Isometry3d PathDistances::poseAt(const Way& way, std::size_t piece, doubl
     return interpolate((*shape.pose)[piece], (*shape.pose)[piece + 1], share);
   };
   const Eigen::Isometry3d mover = at(shapes_[way.mover]);
-  if (way.still == OBSTACLE_BODY) return outcome_->step->map.map_from_fixed * mover;
+  if (way.still == OBSTACLE_BODY) return outcome_->step->map.fromFixedAt(1) * mover;
   return shapes_[way.still].pose ? at(shapes_[way.still]).inverse() * mover : mover;
 }
 
@@ -108,7 +108,7 @@ PathDistances::Way PathDistances::wayOf(const std::array<std::uint16_t, 2>& body
   const bool both = still && still->pose;
   way.bends = both ? 2 : 1;
   const double out_m = mover.reach_m + mover.out_m + (still ? still->reach_m + still->out_m : 0) +
-                       (with_map ? largestOf(outcome_->step->map.map_from_fixed.translation()) : 0);
+                       (with_map ? largestOf(outcome_->step->map.fromFixedAt(1).translation()) : 0);
   way.rounding_m = out_m < LARGEST_M ? tolerance::CLEARANCE * out_m : SpeedBound::NONE;
   way.gone_m.push_back(0);
   way.pose.push_back(poseAt(way, 0, 0));
@@ -205,7 +205,7 @@ Vec3 PathDistances::nearest(const Way& way, double time_s) {
   over(way, {time_s, time_s}, LARGEST_M, 1e-6);
   if (!std::isfinite(found_.upper_m)) return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   const Vec3 between = (found_.point[0] + found_.point[1]) / 2;
-  if (way.still == OBSTACLE_BODY) return outcome_->step->map.map_from_fixed.inverse() * between;
+  if (way.still == OBSTACLE_BODY) return outcome_->step->map.fromFixedAt(1).inverse() * between;
   const std::vector<Eigen::Isometry3d>* const pose = shapes_[way.still].pose;
   const std::size_t piece = path_->pieceAt(time_s);
   return pose ? interpolate((*pose)[piece], (*pose)[piece + 1], path_->shareAt(piece, time_s)) * between : between;

@@ -97,7 +97,10 @@ class Search {
       }
       bool slows = true;
       for (const std::uint16_t body : row.body) {
-        if (body == OBSTACLE_BODY) continue;
+        if (body == OBSTACLE_BODY) {
+          if (!outcome_.step->map.way.empty()) pair.other_m_s = pair.closing_m_s = SpeedBound::NONE;
+          continue;
+        }
         if (path_.find(body)) {
           ++pair.on_path;
           slows = slows && full_[body].slows_down;

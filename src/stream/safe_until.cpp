@@ -133,7 +133,7 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
     }
     if (step_->bodies.size() != outcome.step->bodies.size()) say("there are other bodies");
     const bool moved = obstacle_ && outcome.obstacle &&
-                       step_->map.map_from_fixed.matrix() != outcome.step->map.map_from_fixed.matrix();
+                       step_->map.fromFixedAt(1).matrix() != outcome.step->map.fromFixedAt(1).matrix();
     const bool grew = outcome.obstacle && outcome.obstacle != obstacle_ &&
                       (obstacle_ ? hasNewVoxels(*outcome.obstacle, *obstacle_) : outcome.obstacle->leafCount() > 0);
     const std::string why = why_void_ && outcome.stamp_ns <= promise_ends_ns ? why_void_(outcome) : "";

@@ -202,10 +202,10 @@ class FilesTest(Files):
         return self.check('.obj', *(OBJ_TRIANGLES % {'z': z, 'faces': faces} for z in ('0.5', '-0.5')))
 
     def test_what_is_not_known_is_said(self):
-        self.assertEqual(self.obj('face 1 2 3\nf 1 2 3\nf 4 5 6\n'), 0)
+        self.assertEqual(self.obj('face 1 2 3\nf 1 2 3\nf 4 5 6\n'), 3)
         self.assertEqual(self.contacts, self.THROUGH)
         for frame in '01':
-            self.assertIn("check_step: %s.obj: 1 lines with unknown keywords are skipped, the first is 'face' in line 7" % frame,
+            self.assertIn("check_step: %s.obj: 1 lines with unknown keywords are unchecked, the first is 'face' in line 7" % frame,
                           self.remarks)
 
     def test_ropes(self):

@@ -126,6 +126,12 @@ def a_map_in_a_frame_that_dips(c):
     c.tf('cart', every(.01, 1.1, -.1), z=lambda t: dip(t) - .1)
 
 
+def a_map_in_a_frame_that_turns_into_the_sheet(c):
+    c.body('sheet', [(x, y, .3) for x, y, _ in SHEET], 3, every(.1))
+    c.map([(6, 0, 0)], -.05, frame='cart')
+    c.tf('cart', every(.02, 1.1, -.1), angle=lambda t: -1.5 * t)
+
+
 def a_body_elsewhere_at_the_same_stamp(c):
     c.body('sheet', SHEET, 3, every(.1))
     c.body('object', SMALL, 2, every(.1), z=lambda t: .1)
@@ -543,6 +549,13 @@ def all_proved_a_fast_robot_whose_joints_come_at_500_hz(c):
 def all_proved_a_fast_arm_seen_at_30_hz_and_a_cloth_at_10(c):
     c.body('sheet', LOW, 3, every(.1, 2))
     an_arm(c, every(1 / 30, 2.1, -.1), lambda t: 1.5 * (t - 1))
+
+
+def all_proved_a_map_and_a_table_that_turn_with_their_frame(c):
+    c.body('sheet', LOW, 3, every(1 / 30, 1.5))
+    c.map([(4, 0, 0), (9, 0, 0)], -.05, frame='cart')
+    c.body('table', SMALL, 2, [-.05], frame='cart', motion='static')
+    c.tf('cart', every(.02, 1.6, -.1), angle=lambda t: t - .7)
 
 
 def all_proved_two_noisy_cloths_out_of_phase(c):

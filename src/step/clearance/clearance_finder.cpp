@@ -13,7 +13,10 @@
 namespace dccd {
 namespace {
 
-bool isIdentity(const Eigen::Isometry3d& pose) { return pose.matrix() == Eigen::Isometry3d::Identity().matrix(); }
+/// The map's frame is the fixed one.
+bool isFixed(const ObstacleMap& map) {
+  return map.way.empty() && map.map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix();
+}
 
 /// It holds something, and squares of distances stay finite.
 bool isUsable(const StepBox& box) {
@@ -70,6 +73,8 @@ void ClearanceFinder::learnBodies(const ClearancePart& part) {
     state.motion = part.scene.vertices() + body.internal_begin;
     state.box = StepBox::still(body.bounds_min, body.bounds_max);
     state.leaves_way_m = leavesWayBy(step_->bodies[b], step_->pose_scale, part.count * stretches_);
+    state.leaves_on_map_m = state.leaves_way_m + leavesWayOnMap(*step_, step_->bodies[b], part.count * stretches_,
+                                                                std::numeric_limits<double>::infinity());
     state.fitted = state.fitted_to_map = false;
     state.known = body.usedCount() > 0 && isUsable(state.box);
     for (std::size_t i = 0; body.masked && i < body.usedCount(); ++i) {
@@ -111,7 +116,7 @@ bool ClearanceFinder::fit(std::size_t b, const ClearancePart& stretch, bool to_m
   if (state.tree.empty()) return false;
   if (to_map && !state.fitted_to_map) {
     const Positions& t0 = inMapFrame(stretch.step.map.map_from_fixed, *motion.t0, state.map_t0);
-    const Positions& t1 = inMapFrame(stretch.step.map.map_from_fixed, *motion.t1, state.map_t1);
+    const Positions& t1 = inMapFrame(stretch.step.map.fromFixedAt(1), *motion.t1, state.map_t1);
     state.on_map.resize(body.usedCount());
     for (std::size_t i = 0; i < body.usedCount(); ++i) {
       const Vec3 &p = t0[body.slot_vertex[i]], &q = t1[body.slot_vertex[i]];
@@ -209,15 +214,14 @@ void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<st
       if (v != NO_INDEX) hull[side].addCorner((*moving.t0)[v], (*moving.t1)[v]);
     }
   }
-  const Eigen::Isometry3d& pose = part.step.map.map_from_fixed;
   if (leaf) {
     distance.voxel = leaf->min;
     distance.voxel_size = leaf->size;
     const LeafBox cube = leafBox(*leaf, part.map->resolution());
     hull[1] = MovingHull::box(cube.lo, cube.hi);
     for (std::size_t i = 0; i < hull[0].count; ++i) {
-      hull[0].t0[i] = pose * hull[0].t0[i];
-      hull[0].t1[i] = pose * hull[0].t1[i];
+      hull[0].t0[i] = part.step.map.map_from_fixed * hull[0].t0[i];
+      hull[0].t1[i] = part.step.map.fromFixedAt(1) * hull[0].t1[i];
     }
   }
   HullPair pair;
@@ -225,7 +229,7 @@ void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<st
   const Nearest nearest = pair.at(t, 0);
   for (int side = 0; side < 2; ++side) {
     const Vec3 point = pair.pointInMetres(nearest.point[side]);
-    distance.point[side] = leaf ? Vec3(pose.inverse() * point) : point;
+    distance.point[side] = leaf ? Vec3(part.step.map.fromFixedAt(t).inverse() * point) : point;
   }
 }
 
@@ -244,7 +248,7 @@ bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& stretch, doub
     apart.lower_m = std::numeric_limits<double>::infinity();
   } else if (a == b) {
     apart.lower_m = isStillFar(a, stretch, limit_m) ? limit_m : 0;
-  } else if (!on_map || isIdentity(stretch.step.map.map_from_fixed)) {
+  } else if (!on_map || isFixed(stretch.step.map)) {
     apart.lower_m = apartByBoxes(bodies_[a].box, on_map ? boxOfMap(*stretch.map) : bodies_[b].box);
   }
   const bool is_far = apart.lower_m >= limit_m;
@@ -261,7 +265,7 @@ void ClearanceFinder::search(Row& row, const ClearancePart& stretch) {
   const bool on_map = b == OBSTACLE_BODY, last = stretch.index + 1 == stretch.count;
   const double limit_m = limitOverStep(row);
   if (needsNoSearch(row, stretch, limit_m)) return;
-  const bool moved = on_map && !isIdentity(stretch.step.map.map_from_fixed);
+  const bool moved = on_map && !isFixed(stretch.step.map);
   if (!fit(a, stretch, moved) || (!on_map && a != b && !fit(b, stretch, false))) {
     row.unknown = true;
     return;
@@ -375,9 +379,8 @@ void ClearanceFinder::describe(const Row& row, const ClearancePart& part, const 
   const OccupiedLeaf& leaf = map_.leaf(found.item[1]);
   distance.voxel = leaf.min;
   distance.voxel_size = leaf.size;
-  const Eigen::Isometry3d& pose = part.step.map.map_from_fixed;
-  if (isIdentity(pose)) return;
-  for (Vec3& point : distance.point) point = pose.inverse() * point;
+  if (isFixed(part.step.map)) return;
+  for (Vec3& point : distance.point) point = part.step.map.fromFixedAt(found.t).inverse() * point;
 }
 
 }  // namespace dccd

@@ -50,7 +50,8 @@ class DCCD_HIDDEN ClearanceFinder {
     const VertexMotion* motion = nullptr;  // of the stretch, by slots
     StepBox box;                           // of that
     std::vector<VertexMotion> placed;      // the same, where the stretch is less than a part
-    double leaves_way_m = 0;               // how far its straight paths do at most
+    // How far its straight paths do at most, and those on a map that moves.
+    double leaves_way_m = 0, leaves_on_map_m = 0;
     FeatureTree tree;
     SurfaceNeighbours neighbours;
     double self_m = 0;  // of the neighbours; 0: they are not known

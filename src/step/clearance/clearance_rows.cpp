@@ -121,7 +121,7 @@ double ClearanceFinder::radiusOf(const Row& row) const {
 /// How far the straight paths of the two may be from their arcs, together.
 double ClearanceFinder::leavesArcsBy(const Row& row) const {
   const auto [a, b] = row.answer.body;
-  return bodies_[a].leaves_way_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].leaves_way_m);
+  return b == OBSTACLE_BODY ? bodies_[a].leaves_on_map_m : bodies_[a].leaves_way_m + bodies_[b].leaves_way_m;
 }
 
 /// From where on they are FARTHER on their straight paths.

@@ -97,12 +97,15 @@ struct Part {
 
 ContactGeometry obstacleGeometry(const Outcome& outcome, const Contact& contact) {
   const Part part(outcome, contact);
-  const Eigen::Isometry3d& map_from_fixed = outcome.step->map.map_from_fixed;
+  const auto mapAt = [&](double t) {
+    return outcome.step->map.fromFixedAt((static_cast<double>(part.part) + t) / static_cast<double>(part.parts));
+  };
+  const Eigen::Isometry3d map_at_start = mapAt(0), map_at_end = mapAt(1);
   Feature feature;
   const int points = factsOf(contact.kind).vertices[0];
   for (int i = 0; i < points; ++i) {
-    const Vec3 from = map_from_fixed * part.from(contact.body[0], contact.vertex[i]);
-    const Vec3 to = map_from_fixed * part.to(contact.body[0], contact.vertex[i]);
+    const Vec3 from = map_at_start * part.from(contact.body[0], contact.vertex[i]);
+    const Vec3 to = map_at_end * part.to(contact.body[0], contact.vertex[i]);
     feature.at[i] = from + part.toc * (to - from);
     feature.motion[i] = static_cast<double>(part.parts) * (to - from);
   }
@@ -116,7 +119,7 @@ ContactGeometry obstacleGeometry(const Outcome& outcome, const Contact& contact)
   if (points == 1) vertexOnFace(feature, cube, out);
   if (points == 2) edgeOnEdge(feature, cube, out);
   if (points == 3) faceOnCorner(feature, cube, out);
-  const Eigen::Isometry3d fixed_from_map = map_from_fixed.inverse();
+  const Eigen::Isometry3d fixed_from_map = mapAt(part.toc).inverse();
   out.point = fixed_from_map * out.point;
   out.normal = fixed_from_map.linear() * out.normal;
   return out;

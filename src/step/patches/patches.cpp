@@ -85,7 +85,7 @@ void PatchMaker::begin(const TouchGraph::Parallel& parallel, Outcome& outcome) {
 }
 
 PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, const Contact& contact) const {
-  if (outcome.substeps > 1) {
+  if (outcome.substeps > 1 || !outcome.step->map.way.empty()) {
     const ContactGeometry geometry = contactGeometry(outcome, contact);
     return {geometry.point, geometry.normal};
   }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <random>
 #include <regex>
 #include <set>
 
@@ -251,8 +252,26 @@ TEST_F(ObjGrammar, LinesOfNumbers) {
 TEST_F(ObjGrammar, UnknownKeywords) {
   const MeshFile mesh = faces("face 1 2 3\nf 1 2 3\nf1 2 3\nf 3 2 4\n");
   expectTwo(mesh, "unknown");
+  EXPECT_EQ(mesh.uncheckedCount(), 2u) << "they may be faces";
   ASSERT_EQ(mesh.hints.size(), 1u);
   EXPECT_TRUE(mentions(mesh.hints[0], "2 lines") && mentions(mesh.hints[0], "'face' in line 5")) << mesh.hints[0];
+}
+
+// Words of nobody's at any place: what is read besides is not taken for the whole.
+TEST_F(ObjGrammar, AnyOtherWordCostsTheProof) {
+  std::mt19937 random(1);
+  const std::vector<std::string> good{"v 0 0 0", "v 1 0 0", "v 0 1 0", "v 1 1 0.25", "f 1 2 3", "f 3 2 4"};
+  for (int i = 0; i < 200; ++i) {
+    std::string word = "q";
+    while (random() % 3 > 0) word += static_cast<char>('a' + random() % 26);
+    const std::size_t place = random() % (good.size() + 1);
+    std::string text;
+    for (std::size_t line = 0; line <= good.size(); ++line) {
+      if (line == place) text += word + (random() % 2 == 0 ? " 1 3 2\n" : "\n");
+      if (line < good.size()) text += good[line] + "\n";
+    }
+    EXPECT_EQ(read("a.obj", text).uncheckedCount(), 1u) << text;
+  }
 }
 
 // --- STL
@@ -635,16 +654,18 @@ TEST_F(PlyGrammar, ElementsThatMayHoldFaces) {
   };
   const MeshFile mesh = read("a.ply", withPoly("int", "0\n3 1 3 2\n3 0 1 3\n"));
   EXPECT_EQ(mesh.faces, TWO) << "the rest is used";
-  EXPECT_EQ(mesh.unchecked, (std::vector<std::size_t>{2, 3})) << "an empty list holds nothing";
-  ASSERT_EQ(mesh.hints.size(), 2u);
-  EXPECT_TRUE(mentions(mesh.hints[0], "'poly' (3) is skipped, though its lists of integers may be faces"));
-  EXPECT_TRUE(
-      mentions(mesh.hints[1], "2 polygons cannot be used and are unchecked, the first is row 1 of element 'poly'"));
+  EXPECT_EQ(mesh.uncheckedCount(), 2u) << "an empty list holds nothing";
+  ASSERT_EQ(mesh.hints.size(), 1u);
+  EXPECT_TRUE(mentions(mesh.hints[0], "'poly' (3) is skipped, though its integers may be corners: unchecked"));
+  const std::string one_by_one = "element triangle 2\nproperty int a\nproperty int b\nproperty int c\n";
+  EXPECT_EQ(
+      read("a.ply", head(xyz() + faceElement() + one_by_one) + points() + faces() + "1 3 2\n0 1 3\n").uncheckedCount(),
+      2u);
   const MeshFile both = read("a.ply", head(xyz() + faceElement(3) + "element poly 1\nproperty list uchar uint idx\n") +
                                           points() + faces() + "3 0 1 0\n3 1 3 2\n");
-  EXPECT_EQ(both.unchecked, (std::vector<std::size_t>{3})) << "what repeats a corner lies in another face";
-  EXPECT_EQ(read("a.ply", withPoly("float", "3 1 3 2\n")).unchecked.size(), 0u);
-  EXPECT_EQ(read("a.ply", withPoly("int", "1 0\n", "range_grid")).unchecked.size(), 0u) << "a scanner's pixels";
+  EXPECT_EQ(both.uncheckedCount(), 1u) << "what repeats a corner lies in another face";
+  EXPECT_EQ(read("a.ply", withPoly("float", "3 1 3 2\n")).uncheckedCount(), 0u);
+  EXPECT_EQ(read("a.ply", withPoly("int", "1 0\n", "range_grid")).uncheckedCount(), 0u) << "a scanner's pixels";
 }
 
 TEST_F(PlyGrammar, Edges) {
@@ -813,6 +834,14 @@ TEST_F(DaeGrammar, WhatIsRefused) {
     doubled += "<node id=\"n" + std::to_string(i) + "\">" + use + use + "</node>";
   }
   expectRefused("a.dae", dae(two(), doubled), "a.dae: ", "the scene is too large");
+}
+
+TEST_F(DaeGrammar, ElementsThatNobodyKnows) {
+  for (const std::string parent : {"scene", "visual_scene", "node", "geometry", "mesh", "triangles"}) {
+    std::string odd = dae(two());
+    odd.insert(odd.find("</" + parent + ">"), "<surface>0 3 2</surface>");
+    expectRefused("a.dae", odd, "a.dae: ", "<surface> is not known where it stands");
+  }
 }
 
 TEST_F(DaeGrammar, WhatContradictsItself) {

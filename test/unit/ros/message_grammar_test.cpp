@@ -483,7 +483,8 @@ TEST_F(MarkerGrammar, WhatCameBeforeAndIsShownStill) {
 
 // What may be a thing beside the mesh is not passed over in silence.
 TEST_F(MarkerGrammar, ThingsBesideTheMesh) {
-  for (const int type : {0, 1, 2, 3, 6, 9, 10}) {  // ARROW, CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT, MESH_RESOURCE
+  // ARROW, CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT, MESH_RESOURCE, and those that nobody knows
+  for (const int type : {0, 1, 2, 3, 6, 9, 10, 12, 99, -1}) {
     anew();
     visualization_msgs::MarkerArray both;
     both.markers = {marker(), marker()};

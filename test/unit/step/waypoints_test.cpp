@@ -196,6 +196,14 @@ TEST(Waypoints, AreRecorded) {
     bad.step.bodies[1].waypoints[0].u = u;
     EXPECT_NE(errorOf(recordingBytes(bad)).find("a waypoint is at"), std::string::npos) << u;
   }
+  recording.step.map.way = {{0.5, recording.step.bodies[2].waypoints[0].pose}, {1, Eigen::Isometry3d::Identity()}};
+  EXPECT_EQ(again(recording).step.map.way[0].pose.matrix(), recording.step.map.way[0].pose.matrix());
+  for (const double u : {0.5, 0.9, std::nan("")}) {
+    StepRecording bad = recording;
+    bad.step.map.way[1].u = u;
+    EXPECT_NE(errorOf(recordingBytes(bad)).find("the map's way has a pose at"), std::string::npos) << u;
+  }
+  recording.step.map.way.clear();
   recording.step.bodies[1].waypoints[0].positions = nullptr;
   EXPECT_NE(errorOf(recordingBytes(recording)).find("a waypoint of body 'tip' has 0 vertices"), std::string::npos);
 }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "dccd/assurance.h"
+#include "dccd/monitor_extras.h"
 #include "unit/stream/monitor_support.h"
 
 namespace dccd {
@@ -206,20 +207,116 @@ TEST_F(Tracks, WhatIsForgottenBeforeTheAnswerIsNoProof) {
   }
 }
 
-TEST_F(Tracks, AMapWhoseFrameGoesIsNoProof) {
-  for (const double speed : {0.0, 0.002, 0.5}) {  // of which the middle one stays within rigid_tolerance_m
-    said.fixed_from["odom"] = [speed](double t) { return Eigen::Isometry3d(Eigen::Translation3d(speed * t, 0, 0)); };
-    Monitor monitor(loose(), {named("floor")});
-    monitor.setTracks(&said);
-    monitor.setMap({VoxelSurface::build(0.1, {{{32768, 32768, 32758}, 1}}), 0, Eigen::Isometry3d::Identity(), "odom"});
-    monitor.push(0, clock(100 * MS), NOW);
-    only(monitor);
-    monitor.push(0, clock(200 * MS), NOW);
-    const Outcome outcome = only(monitor);
-    if (speed < 0.01) {
-      EXPECT_TRUE(assuranceOf(outcome).clear()) << outcome.reason;
-    } else {
-      expectDoubt(outcome, "m from where it was at its stamp; set fixed_frame to it");
+/// A floor at rest and a map of one voxel of 10 cm, from this key on, in the frame 'odom'.
+struct MapTracks : Tracks {
+  MonitorOptions options = loose();
+  Body sheet = named("floor");
+  VoxelKey key{32768, 32768, 32758};
+  std::unique_ptr<Monitor> monitor;
+
+  Outcome last() {
+    monitor = std::make_unique<Monitor>(options, std::vector<Body>{sheet});
+    monitor->setTracks(&said);
+    monitor->setMap({VoxelSurface::build(0.1, {{key, 1}}), 0, said.poseOf("odom", 0).inverse(), "odom"});
+    monitor->push(0, clock(100 * MS), NOW);
+    only(*monitor);
+    monitor->push(0, clock(200 * MS), NOW);
+    return only(*monitor);
+  }
+  /// Up by that much and down again between two frames; the voxel's top is 0.9 m below the floor.
+  void rise(double height) {
+    said.fixed_from["odom"] = [height](double t) {
+      return Eigen::Isometry3d(
+          Eigen::Translation3d(0, 0, t < 0.1 ? 0 : height * std::pow(std::sin(M_PI * (t - 0.1) / 0.1), 2)));
+    };
+  }
+};
+
+TEST_F(MapTracks, AMapGoesAsItsFrameDoes) {
+  for (const double height : {0.0, 0.0005, 0.8, 1.0}) {
+    rise(height);
+    const Outcome outcome = last();
+    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+    EXPECT_EQ(outcome.substeps == 1, height < 0.001) << "what stays within rigid_tolerance_m is no part";
+    EXPECT_EQ(assuranceOf(outcome).clear(), height < 0.9);
+    if (height < 0.9) continue;
+    ASSERT_FALSE(outcome.contacts.empty());
+    const double toc = std::asin(std::sqrt(0.9 / height)) / M_PI;
+    EXPECT_NEAR(outcome.earliest_toc, toc, 0.02);
+    const ContactGeometry geometry = contactGeometry(outcome, outcome.contacts.front());
+    EXPECT_NEAR(geometry.point.z(), 0, 2e-3) << "in the fixed frame";
+  }
+}
+
+// The lowest corner of the voxel swings 5 mm lower than both ends of its arc.
+TEST_F(MapTracks, AMapThatTurnsIsFollowedBetweenKnots) {
+  said.has_ends_alone = true;
+  key = {32768, 32768, 32768};
+  for (const double height : {0.009, 0.001}) {
+    said.fixed_from["odom"] = [height](double t) {
+      const Eigen::AngleAxisd turn(4 * (t - 0.15), Vec3::UnitX());
+      return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1 + height) * turn * Eigen::Translation3d(0, 0, -1));
+    };
+    const Outcome outcome = last();
+    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+    EXPECT_EQ(assuranceOf(outcome).clear(), height > 0.005) << height;
+    const Outcome now = monitor->checkNow();
+    EXPECT_TRUE(assuranceOf(now).proved) << now.reason;
+    EXPECT_EQ(now.step->map.map_from_fixed.matrix(), said.poseOf("odom", 200 * MS).inverse().matrix());
+  }
+}
+
+TEST_F(MapTracks, WhatIsHeldAgainstAMapThatStaysIsNoProofOnOneThatGoes) {
+  rise(0.5);
+  EXPECT_TRUE(assuranceOf(last()).proved);
+  options.detector.exclude_boxes = {{{-9, -9, -9}, {9, 9, 9}}};
+  expectDoubt(last(), "the octomap's frame moves, and exclude_boxes do not");
+  options.detector.exclude_boxes.clear();
+  sheet.own_voxels_m = 0.01;
+  expectDoubt(last(), "m from where it was at its stamp; set fixed_frame to it");
+}
+
+// A distance is that of where the map is; of one that goes nothing is promised.
+TEST_F(MapTracks, DistancesAreThoseOfAMapThatGoes) {
+  options.detector.clearance.wanted = true;
+  options.detector.clearance.max_m = 2;
+  rise(0.8);
+  const Outcome outcome = last();
+  ASSERT_EQ(outcome.clearances.size(), 1u);
+  const Clearance& row = outcome.clearances.back();
+  ASSERT_EQ(row.body[1], OBSTACLE_BODY);
+  EXPECT_LE(row.over_step.lower_m, 0.1);
+  EXPECT_NEAR(row.over_step.upper_m, 0.1, 0.01);
+  EXPECT_NEAR(row.at_end.upper_m, 0.9, 0.01);
+  EXPECT_NEAR(row.over_step.t, 0.5, 0.05);
+  SpeedBound slow;
+  slow.max_m_s = 0.1;
+  EXPECT_FALSE(safeUntil(outcome, {slow}).isPromise());
+  rise(0);
+  EXPECT_TRUE(safeUntil(last(), {slow}).isPromise());
+}
+
+// A static tip dips through the floor with its frame; or was only seen from there, and stays.
+TEST_F(Tracks, AStaticBodyGoesAsItsFrameDoes) {
+  std::vector<Body> bodies{named("floor"), named("tip")};
+  bodies[1].motion = BodyMotionKind::STATIC;
+  for (const double depth : {0.0, 0.9, 1.1}) {
+    said.fixed_from["hand"] = [depth](double t) {
+      return Eigen::Isometry3d(
+          Eigen::Translation3d(0, 0, t < 0.1 ? 1 : 1 - depth * std::pow(std::sin(M_PI * (t - 0.1) / 0.1), 2)));
+    };
+    for (const bool takes_along : {true, false}) {
+      Monitor monitor(loose(), bodies);
+      monitor.setTracks(&said);
+      MeshFrame frame = held(50 * MS);
+      frame.carrier.takes_along = takes_along;
+      monitor.push(1, frame, NOW);
+      monitor.push(0, clock(100 * MS), NOW);
+      only(monitor);
+      monitor.push(0, clock(200 * MS), NOW);
+      const Outcome outcome = only(monitor);
+      EXPECT_EQ(assuranceOf(outcome).proved, takes_along || depth == 0) << outcome.reason;
+      if (takes_along) EXPECT_EQ(assuranceOf(outcome).clear(), depth < 1) << depth;
     }
   }
 }
