@@ -35,7 +35,7 @@ struct PinholeView {
   std::size_t height = 0, width = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
   std::string unrectified;  ///< what tells a picture that is not rectified from one that is; empty: nothing
-  std::string problem;     ///< why its pictures cannot be used; empty: they can
+  std::string problem;      ///< why its pictures cannot be used; empty: they can
 };
 /// The projection of the rectified picture. Throws WireError for what is no CameraInfo.
 PinholeView readPinhole(WireReader& wire);

@@ -163,7 +163,7 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
       {picture([](auto& p) { p.data.resize(1000); }), infoOf(), "64 x 64 pixels of 32FC1 in rows of 260 bytes do not"},
       {picture([](auto& p) { p.step = 255; }), infoOf(), "in rows of 255 bytes do not fit"},
       {picture([](auto& p) { p.height = 0; }), infoOf(), "it has no pixels"},
-      {good, info([](auto& i) { i.D[1] = -0.2; }), "D[1] is -0.2: pictures with distortion are not rectified"},
+      {good, info([](auto& i) { i.D[1] = -0.2; }), "D[1] is -0.2: pictures with distortion"},
       {good, info([](auto& i) { i.R[1] = 0.02; }), "R[1] is 0.02: pictures with distortion"},
       {good, info([](auto& i) { i.R[8] = 0; }), "R[8] is 0: pictures with distortion"},
       {good, info([](auto& i) { i.header.frame_id = "other"; }), "its frame_id is 'other', and the picture's 'camera'"},
@@ -408,6 +408,9 @@ TEST(Sensors, WhatLiesBeyondTheOctreeIsRefusedWithItsCure) {
   far.child_frame_id = "far";
   far.transform.translation.x = 456000;  // UTM
   camera.transforms.setTransform(far, "test", true);
+  sensor_msgs::CameraInfo info = infoAt(1);
+  info.header.frame_id = "far";
+  camera.clouds.setCameraInfo(0, "", bytesOf(info));
   for (const std::string& why : {camera.whyNot(pictureOf(1, tableDepth, "32FC1", false, "far")),
                                  Camera().whyNot(cloudOf(1, {{0, 0, 1}, {0, 0, 5000}}))}) {
     EXPECT_TRUE(says(why, "the 65536 voxels of 0.1 m that a map can span"));
