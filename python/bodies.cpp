@@ -51,7 +51,8 @@ NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::objec
                    const std::string& name, bool rigid, bool fixed, bool self_collision, bool against_bodies,
                    bool against_obstacle, bool shell, double minimum_separation_m, py::object vertex_mask,
                    const std::map<std::string, double>& separations_m, py::object reference, py::object radius_m,
-                   py::object pose_t0, py::object pose_t1) {
+                   py::object pose_t0, py::object pose_t1, const py::kwargs& others) {
+  if (!others.empty()) refuseBodyOption(py::str(others.begin()->first));
   NamedBody made;
   Body& body = made.body;
   const std::shared_ptr<const Positions> start = t0.is_none() ? nullptr : positionsOf(t0, "t0");

@@ -58,6 +58,7 @@ py::dict optionsOf(const Options& options, const std::vector<Body>& bodies);
 /// False: there is no such option.
 bool setOption(const std::string& name, py::handle value, const std::vector<Body>& bodies, Options& options);
 [[noreturn]] void refuseOption(const std::string& name);
+[[noreturn]] void refuseBodyOption(const std::string& name);
 double numberOf(py::handle value, const std::string& name);
 
 /// Runs `work` without the interpreter's lock. With a `cancel` a thread of its own does it, while this one sees to

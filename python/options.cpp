@@ -213,6 +213,14 @@ void refuseOption(const std::string& name) {
   throw py::type_error("there is no option '" + name + "'; there are " + known);
 }
 
+void refuseBodyOption(const std::string& name) {
+  for (const Row& row : rows()) {
+    if (name != row.name) continue;
+    throw py::type_error("'" + name + "' is no option of a body but of a call: dccd.detect(..., " + name + "=...)");
+  }
+  throw py::type_error("a body has no option '" + name + "'; help(dccd.Body) names all");
+}
+
 void setOptions(const py::dict& values, const Bodies& bodies, Options& options) {
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);

@@ -74,17 +74,25 @@ DepthView readDepth(WireReader& wire) {
 
 PinholeView readPinhole(WireReader& wire) {
   PinholeView view;
-  view.stamp_ns = readHeader(wire).stamp_ns;
+  const HeaderView header = readHeader(wire);
+  view.stamp_ns = header.stamp_ns;
+  view.frame_id = shortText(header.frame_id);
   const std::size_t size = wire.left();
   if (size > MOST_PINHOLE) throw WireError("it has " + std::to_string(size) + " bytes, which no pinhole needs");
-  view.said = wire.rest();
+  view.said = view.frame_id + '\n' + std::string(wire.rest());
   view.height = wire.read<std::uint32_t>("height");
   view.width = wire.read<std::uint32_t>("width");
   wire.readString("distortion_model");
   const WireSpan<double> distortion = wire.readArray<double>("D");
-  const auto skipMatrix = [&](const char* name) { wire.skip(9 * sizeof(double), name); };
-  skipMatrix("K");
-  skipMatrix("R");
+  wire.skip(9 * sizeof(double), "K");
+  const auto tell = [&](const char* name, std::size_t i, double value, double rectified) {
+    if (value == rectified || !view.unrectified.empty()) return;
+    std::ostringstream text;
+    text << name << '[' << i << "] is " << value;
+    view.unrectified = text.str();
+  };
+  for (std::size_t i = 0; i < distortion.size; ++i) tell("D", i, distortion[i], 0);
+  for (std::size_t i = 0; i < 9; ++i) tell("R", i, wire.read<double>("R"), i % 4 == 0 ? 1 : 0);
   std::array<double, 12> p{};
   for (double& value : p) value = wire.read<double>("P");
   const auto binning_x = wire.read<std::uint32_t>("binning_x"), binning_y = wire.read<std::uint32_t>("binning_y");
@@ -92,11 +100,6 @@ PinholeView readPinhole(WireReader& wire) {
   wire.skip(2 * sizeof(std::uint32_t), "roi");
   wire.skip(1, "roi.do_rectify");
   view.fx = p[0], view.fy = p[5], view.cx = p[2], view.cy = p[6];
-  for (std::size_t i = 0; i < distortion.size && view.distortion.empty(); ++i) {
-    std::ostringstream text;
-    text << "D[" << i << "] is " << distortion[i];
-    if (distortion[i] != 0) view.distortion = text.str();
-  }
   std::ostringstream problem;
   const bool is_pinhole = view.fx > 0 && view.fy > 0 && std::isfinite(view.fx * view.fy * view.cx * view.cy) &&
                           p[1] == 0 && p[3] == 0 && p[4] == 0 && p[7] == 0;

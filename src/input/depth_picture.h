@@ -30,11 +30,12 @@ DepthView readDepth(WireReader& wire);
 /// Where a pixel looks: through ((column - cx) / fx, (row - cy) / fy, 1) of the optical frame.
 struct PinholeView {
   StampNs stamp_ns = 0;
-  std::string said;  ///< all of the message but its header, as it came: two are alike where it is; empty: it is none
+  std::string frame_id;  ///< cut at MAX_TEXT
+  std::string said;      ///< all of the message but its stamp, as it came: two are alike where it is; empty: it is none
   std::size_t height = 0, width = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
-  std::string distortion;  ///< what a picture has that is not rectified, in words; empty: none
-  std::string problem;     ///< why its pictures cannot be used; empty: they can
+  std::string unrectified;  ///< what tells a picture that is not rectified from one that is; empty: nothing
+  std::string problem;      ///< why its pictures cannot be used; empty: they can
 };
 /// The projection of the rectified picture. Throws WireError for what is no CameraInfo.
 PinholeView readPinhole(WireReader& wire);

@@ -25,10 +25,15 @@ std::string meshTopics(const std::map<std::string, std::string>& types) {
   return names;
 }
 
+/// The master tells of a publisher before the two are connected, and goes on to when it was killed.
+bool isPublished(const AwaitedTopic& topic, const std::map<std::string, std::string>& published) {
+  return topic.publishers > 0 || (!topic.heard && published.count(topic.name) > 0);
+}
+
 /// Empty: its publisher lives, and need not say anything.
-std::string whySilent(const AwaitedTopic& topic) {
+std::string whySilent(const AwaitedTopic& topic, bool is_published) {
   const std::string nobody = "nobody publishes " + topic.name + (topic.heard ? " any more" : "");
-  if (topic.publishers == 0) return nobody + (topic.heard ? "; start its publisher again" : "");
+  if (!is_published) return nobody + (topic.heard ? "; start its publisher again" : "");
   if (topic.named_by.empty()) return "";
   // One that was killed stays connected.
   return topic.name + (topic.heard ? " has fallen silent" : " has a publisher, but no message has come") +
@@ -44,9 +49,10 @@ std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<
   }
   std::string text, given_by;
   for (const AwaitedTopic& topic : silent) {
-    const std::string why = whySilent(topic);
+    const bool is_published = isPublished(topic, published);
+    const std::string why = whySilent(topic, is_published);
     text += (text.empty() || why.empty() ? "" : "; ") + why;
-    if (topic.publishers > 0 || topic.heard || topic.named_by.empty()) continue;
+    if (is_published || topic.heard || topic.named_by.empty()) continue;
     given_by += (given_by.empty() ? "" : ", ") + topic.named_by;
   }
   if (given_by.empty()) return text;

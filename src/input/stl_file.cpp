@@ -53,7 +53,7 @@ class AsciiReader {
     for (int corner = 0; corner < 3; ++corner) {
       expect("vertex");
       Vec3 p;
-      for (double& x : p) x = lines_.number(take("a vertex of three numbers"));
+      for (int axis = 0; axis < 3; ++axis) p[axis] = lines_.number(take("a vertex of three numbers"));
       corners_.push_back(p);
     }
     for (const char* word : {"endloop", "endfacet"}) expect(word);

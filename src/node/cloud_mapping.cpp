@@ -163,10 +163,17 @@ SensorView CloudMapping::readPicture(const CloudMessage& message, Reading& readi
   while (!(pinhole = camera_infos_[message.source].find(picture.header.stamp_ns, why_not))) {
     if (!reading.mayWait()) throw WireError(why_not);
   }
-  if (!pinhole->problem.empty()) throw WireError("the CameraInfo on " + topic + ": " + pinhole->problem);
-  if (!pinhole->distortion.empty() && !isRectified(source.topic)) {
-    throw WireError("the CameraInfo on " + topic + ": " + pinhole->distortion +
-                    ": pictures with distortion are not rectified; take the driver's image_rect, or its cloud");
+  const std::string of = "the CameraInfo on " + topic + ": ", &frame = reading.view.second;
+  if (!pinhole->problem.empty()) throw WireError(of + pinhole->problem);
+  if (frameNameOf({0, pinhole->frame_id}) != frame) {
+    throw WireError(of + "its frame_id is '" + pinhole->frame_id + "', and the picture's '" + frame +
+                    "': they are of two cameras, or one names the wrong frame");
+  }
+  // Where a rectified picture looks P tells, in the frame that it names, as to depth_image_proc.
+  if (!pinhole->unrectified.empty() && !isRectified(source.topic)) {
+    throw WireError(of + pinhole->unrectified +
+                    ": pictures with distortion (D not 0, R not the identity) are not "
+                    "rectified; take the driver's image_rect, or its cloud");
   }
   if (pinhole->width != picture.width || pinhole->height != picture.height) {
     std::ostringstream text;
@@ -175,7 +182,7 @@ SensorView CloudMapping::readPicture(const CloudMessage& message, Reading& readi
     throw WireError(text.str());
   }
   SensorView seen;
-  seen.map_from_sensor = place(reading.view.second, message, reading);
+  seen.map_from_sensor = place(frame, message, reading);
   picture.depthsInto(numbers_);
   seen.depth_m = numbers_.data();
   seen.width = picture.width;

@@ -35,7 +35,7 @@ void writeCells(std::ostream& out, const ClearanceDistance& d) {
   cell(taken, d.upper_m);
   cell(taken, d.t);
   for (const Vec3& point : d.point) {
-    for (const double x : point) cell(std::isfinite(x), x);
+    for (int axis = 0; axis < 3; ++axis) cell(std::isfinite(point[axis]), point[axis]);
   }
   for (const auto& vertices : d.vertex) {
     for (const Index v : vertices) cell(v != NO_INDEX, v);

@@ -76,7 +76,8 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         with open(self.folder / 'clouded/contacts.csv') as file:
             self.assertIn('octomap', {row['body_1'] for row in csv.DictReader(file)})
         # The same as depth pictures, whose CameraInfo comes late.
-        info = CameraInfo(height=100, width=100, P=[49.5 * height, 0, 49.5, 0, 0, 49.5 * height, 49.5, 0, 0, 0, 1, 0])
+        info = CameraInfo(height=100, width=100, R=[1, 0, 0, 0, 1, 0, 0, 0, 1], P=[49.5 * height, 0, 49.5, 0, 0, 49.5 * height, 49.5, 0, 0, 0, 1, 0])
+        info.header.frame_id = plate.header.frame_id
         pictures = []
         for frame in self.cloths:
             picture = Image(height=100, width=100, encoding='32FC1', step=400, data=struct.pack('<f', height) * 10000)

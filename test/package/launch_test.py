@@ -107,7 +107,7 @@ class LaunchTest(unittest.TestCase):
     def test_rviz_draws_bodies_and_map(self):
         """An empty view looks like a monitor that does not run."""
         found = self.parameters('monitor.launch', 'rviz:=true')
-        self.assertEqual((found['markers/mesh'], found['markers/obstacle_m']), (True, 0.1))
+        self.assertEqual((found['markers/mesh'], found['markers/obstacle_m']), (True, 1.0))
         self.assertEqual(self.parameters('monitor.launch')['markers/mesh'], False)
 
     def test_a_topic_for_the_map_wins_over_its_file(self):

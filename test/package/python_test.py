@@ -478,7 +478,8 @@ class ArraysTest(PythonTestCase):
                 ({'pose_t0': np.eye(4), 'pose_t1': np.eye(3)}, ValueError, r'pose_t1 has shape \(3, 3\), expected \(4, 4\)'),
                 ({'pose_t0': np.eye(4), 'pose_t1': np.diag([-1., -1, 1, 1])}, ValueError, r't1\[\d\] is not where the poses take it'),
                 ({'mesh': dccd.Mesh(6, FACES)}, TypeError, 'expected a mesh, or triangles, or edges'),
-                ({'colour': 1}, TypeError, 'incompatible constructor arguments')]:
+                ({'colour': 1}, TypeError, r"^a body has no option 'colour'; help\(dccd.Body\) names all$"),
+                ({'step_budget_ms': 3}, TypeError, r"^'step_budget_ms' is no option of a body but of a call: dccd.detect\(..., step_budget_ms=...\)$")]:
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
                 dccd.detect(dccd.Body(t0, t1, FACES, **options))
 

@@ -96,7 +96,9 @@ struct SeeingTwice : StateTest {
   }
   static sensor_msgs::CameraInfo info() {
     sensor_msgs::CameraInfo out;
+    out.header.frame_id = "camera";
     out.width = out.height = 32;
+    out.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     out.P = {32, 0, 15.5, 0, 0, 32, 15.5, 0, 0, 0, 1, 0};
     return out;
   }

@@ -177,7 +177,7 @@ void writeBinaryStl(Writer& w) {
     for (int axis = 0; axis < 3; ++axis)
       put(w.bytes, w.has("normals of nan") ? std::numeric_limits<float>::quiet_NaN() : 0.f);
     for (const Index v : face) {
-      for (const double x : w.mesh.positions[v]) put(w.bytes, static_cast<float>(x));
+      for (int axis = 0; axis < 3; ++axis) put(w.bytes, static_cast<float>(w.mesh.positions[v][axis]));
     }
     put(w.bytes, static_cast<std::uint16_t>(w.has("attributes") ? 0x8123 : 0));
   }

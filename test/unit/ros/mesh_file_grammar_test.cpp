@@ -478,7 +478,7 @@ class PlyGrammar : public Grammar {
     for (const double weight : {0.5, 2.0}) put(text, weight, big);
     put(text, std::int16_t{-7}, big);
     for (const Vec3& p : SQUARE) {
-      for (const double x : p) put(text, static_cast<Real>(x), big);
+      for (int axis = 0; axis < 3; ++axis) put(text, static_cast<Real>(p[axis]), big);
       text += std::string("\3abc");
     }
     for (const Face& face : TWO) {

@@ -18,7 +18,11 @@ TEST(Silence, WhatIsWaitedForIsNoMistake) {
             "nobody publishes /tracker/cloth; give the mesh's topic with mesh:=TOPIC; published are /tracker/clothes "
             "(sensor_msgs/PointCloud2)");
   EXPECT_FALSE(isYetToCome(misspelt));
-  const std::string ended = silenceHint({{"/tracker/cloth", 0, "mesh:=TOPIC", true}}, {});
+  // The master knew of it before the monitor was connected.
+  EXPECT_EQ(silenceHint({cloth}, {{"/tracker/cloth", "sensor_msgs/PointCloud2"}}),
+            "/tracker/cloth has a publisher, but no message has come (see rostopic hz and rosnode ping)");
+  const std::string ended =
+      silenceHint({{"/tracker/cloth", 0, "mesh:=TOPIC", true}}, {{"/tracker/cloth", "sensor_msgs/PointCloud2"}});
   EXPECT_EQ(ended, "nobody publishes /tracker/cloth any more; start its publisher again");
   EXPECT_FALSE(isYetToCome(ended));
   EXPECT_FALSE(isYetToCome(silenceHint({{"/octomap", 0, "", false}}, {}))) << "which was called for";

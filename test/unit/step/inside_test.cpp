@@ -113,7 +113,10 @@ TEST(Inside, OneBoxHasOneAnswerHoweverItsCornersAreNumbered) {
   EXPECT_FALSE(assuranceOf(startOf(step)).clear());
   EXPECT_TRUE(same(trueInsides(step), {insideOf(0, 0, 1)}));
   step.bodies[1].t0[4] += 0.0 * step.bodies[1].t0[4];  // zeros of either sign are one place
-  for (double& x : step.bodies[1].t0[7]) x = x == 0 ? -0.0 : x;
+  for (int axis = 0; axis < 3; ++axis) {
+    double& x = step.bodies[1].t0[7][axis];
+    x = x == 0 ? -0.0 : x;
+  }
   EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 0, 1)}));
   // As a soup of two layers, one for either side, and with a face that is a line in it.
   TestStep layers = clothInABox();

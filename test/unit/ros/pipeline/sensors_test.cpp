@@ -74,9 +74,11 @@ sensor_msgs::PointCloud2 pointsOf(double stamp_s, const Depth& depth, bool is_or
 
 sensor_msgs::CameraInfo infoOf() {
   sensor_msgs::CameraInfo out;
+  out.header.frame_id = "camera";
   out.width = out.height = PIXELS;
   out.distortion_model = "plumb_bob";
   out.D.assign(5, 0.0);
+  out.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   out.P = {FOCAL_PX, 0, CENTRE_PX, 0, 0, FOCAL_PX, CENTRE_PX, 0, 0, 0, 1, 0};
   return out;
 }
@@ -161,7 +163,11 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
       {picture([](auto& p) { p.data.resize(1000); }), infoOf(), "64 x 64 pixels of 32FC1 in rows of 260 bytes do not"},
       {picture([](auto& p) { p.step = 255; }), infoOf(), "in rows of 255 bytes do not fit"},
       {picture([](auto& p) { p.height = 0; }), infoOf(), "it has no pixels"},
-      {good, info([](auto& i) { i.D[1] = -0.2; }), "D[1] is -0.2: pictures with distortion are not rectified"},
+      {good, info([](auto& i) { i.D[1] = -0.2; }), "D[1] is -0.2: pictures with distortion"},
+      {good, info([](auto& i) { i.R[1] = 0.02; }), "R[1] is 0.02: pictures with distortion"},
+      {good, info([](auto& i) { i.R[8] = 0; }), "R[8] is 0: pictures with distortion"},
+      {good, info([](auto& i) { i.header.frame_id = "other"; }), "its frame_id is 'other', and the picture's 'camera'"},
+      {good, info([](auto& i) { i.header.frame_id = ""; }), "its frame_id is '', and the picture's 'camera'"},
       {good, info([](auto& i) { i.P[0] = 0; }), "is no pinhole's projection"},
       {good, info([](auto& i) { i.P[3] = -20; }), "is no pinhole's projection"},
       {good, info([](auto& i) { i.binning_x = 2; }), "binning 2 x 0"},
@@ -178,7 +184,7 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
   rectified["obstacle_cloud_topic"] = "/camera/depth/image_rect_raw";
   Seen calibrated(rectified);
   calibrated.showCamera();
-  calibrated.clouds.setCameraInfo(0, "", bytesOf(info([](auto& i) { i.D[1] = -0.2; })));
+  calibrated.clouds.setCameraInfo(0, "", bytesOf(info([](auto& i) { i.D[1] = -0.2, i.R[1] = 0.02; })));
   EXPECT_EQ(calibrated.add(good).problem, "") << "the distortion is that of the picture before";
   Seen without;
   without.showCamera();
@@ -247,6 +253,12 @@ TEST(Sensors, ACameraInfoThatComesLaterAndIsAnotherOneIsTold) {
   EXPECT_EQ(camera.hear(infoAt(1.3, 640)), "") << "of no picture that was used";
   sensor_msgs::CameraInfo bare = infoAt(0, 32);
   EXPECT_EQ(camera.hear(bare), "") << "of no stamp";
+  Zooming renamed;
+  renamed.hear(infoAt(1));
+  EXPECT_EQ(renamed.whyNot(1.1), "");
+  sensor_msgs::CameraInfo other = infoAt(1.1);
+  other.header.frame_id = "other";
+  EXPECT_NE(renamed.hear(other), "") << "of another frame";
 }
 
 TEST(Sensors, OfACutMessageNothingIsTaken) {
@@ -396,6 +408,9 @@ TEST(Sensors, WhatLiesBeyondTheOctreeIsRefusedWithItsCure) {
   far.child_frame_id = "far";
   far.transform.translation.x = 456000;  // UTM
   camera.transforms.setTransform(far, "test", true);
+  sensor_msgs::CameraInfo info = infoAt(1);
+  info.header.frame_id = "far";
+  camera.clouds.setCameraInfo(0, "", bytesOf(info));
   for (const std::string& why : {camera.whyNot(pictureOf(1, tableDepth, "32FC1", false, "far")),
                                  Camera().whyNot(cloudOf(1, {{0, 0, 1}, {0, 0, 5000}}))}) {
     EXPECT_TRUE(says(why, "the 65536 voxels of 0.1 m that a map can span"));
