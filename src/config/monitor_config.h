@@ -35,6 +35,7 @@ struct BodyConfig {
   std::string tf_frame;
   double mesh_scale = 1;
   SpeedBound speed;                               ///< after a step; of a static body 0
+  std::string carried_by;                         ///< the frame that does; empty: none is named
   double max_acceleration_m_s2 = 0;               ///< between two frames no vertex has more; 0: nobody says
   std::shared_ptr<const MeshResource> link_mesh;  ///< of a robot's link it is made already
   bool isRigid() const { return body.rigid; }

@@ -43,6 +43,20 @@ void readSpeeds(ParameterReader& reader, MonitorConfig& config) {
   if (reader.has("intent")) config.intent = readIntent(reader.neededSection("intent"));
 }
 
+void findCarriers(const ParameterReader& reader, MonitorConfig& config) {
+  for (BodyConfig& body : config.bodies) {
+    if (!std::isfinite(body.speed.relative_m_s)) continue;
+    const auto carrier = std::find_if(config.bodies.begin(), config.bodies.end(), [&](const BodyConfig& other) {
+      return other.isRigid() && !body.carried_by.empty() && other.tf_frame == body.carried_by;
+    });
+    if (carrier == config.bodies.end()) {
+      reader.fail("bodies/" + body.body.name + "/carried_by",
+                  "is '" + body.carried_by + "', which carries no rigid body or link that is watched");
+    }
+    body.speed.carrier = static_cast<std::size_t>(carrier - config.bodies.begin());
+  }
+}
+
 void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config) {
   if (config.intent && !config.promises()) {
     reader.fail("intent",

@@ -171,7 +171,7 @@ IntendedPath IntendedMotion::emptyPath(const std::vector<CarriedBody>& on_it) co
   IntendedPath path;
   path.deviation_m = limits_.deviation_m;
   path.deviation_rate_m_s = limits_.deviation_rate_m_s;
-  for (const CarriedBody& one : on_it) path.bodies.push_back({one.body, {}});
+  for (const CarriedBody& one : on_it) path.bodies.push_back({one.body, {}, one.carrier, one.relative_m_s});
   return path;
 }
 
@@ -285,14 +285,14 @@ std::optional<IntendedPath> IntendedMotion::byTwists(const Step& step, const std
     drop("header/frame_id '" + frame + "' " + (begin ? "carries nothing that is watched" : "has no place"));
     return std::nullopt;
   }
+  IntendedPath path = emptyPath(on_it);
   double far_m = 0, reach_m = 0;
   std::vector<Eigen::Isometry3d> from_frame;
   for (const CarriedBody& one : on_it) {
-    from_frame.push_back(begin->inverse() * step.bodies[one.body].pose_t1);
+    from_frame.push_back(begin->inverse() * step.bodies[path.bodies[from_frame.size()].frameOf()].pose_t1);
     reach_m = std::max(reach_m, one.reach_m);
     far_m = std::max(far_m, from_frame.back().translation().norm() + one.reach_m);
   }
-  IntendedPath path = emptyPath(on_it);
   Eigen::Isometry3d at = *begin;
   for (std::size_t m = 0; m < motions_.size() && motions_[m].isTwist() && motions_[m].frame == frame; ++m) {
     const Motion& motion = motions_[m];

@@ -322,7 +322,7 @@ class MonitorPipeline {
   void followIntended();
   AlongPath searchAlong(const IntendedPath& path, FirstTouch* first = nullptr);
   IntendedMotion::Lookup places();
-  std::vector<CarriedBody> carriedBodies() const;
+  std::vector<CarriedBody> carriedBodies(const Step& step) const;
   void loadFiles();
   /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.
   void doubtMap(const Outcome& outcome);

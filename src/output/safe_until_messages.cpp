@@ -15,8 +15,11 @@ void fillPair(const Outcome& outcome, std::size_t limiting, Message& out) {
 }
 
 /// What is assumed of one body's speed.
-std::string assumedOf(const Body& body, const SpeedBound& bound) {
+std::string assumedOf(const std::vector<Body>& bodies, const Body& body, const SpeedBound& bound) {
   std::ostringstream text;
+  if (bound.carrier < bodies.size())
+    text << "no vertex of '" << body.name << "' leaves where '" << bodies[bound.carrier].name
+         << "' carries it faster than " << bound.relative_m_s << " m/s, and ";
   if (bound.last_step_factor > 0) {
     text << "no vertex of '" << body.name << "' is faster than " << bound.last_step_factor
          << " times its fastest in this step";
@@ -44,7 +47,7 @@ std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<S
   if (!outcome.answered) return sentences;
   const std::vector<Body>& bodies = outcome.step->bodies;
   for (std::size_t b = 0; b < bodies.size() && b < bounds.size(); ++b) {
-    if (bodies[b].topology->vertexCount() > 0) sentences.push_back(assumedOf(bodies[b], bounds[b]));
+    if (bodies[b].topology->vertexCount() > 0) sentences.push_back(assumedOf(bodies, bodies[b], bounds[b]));
   }
   sentences.push_back(outcome.obstacle
                           ? "all that can be touched is in the map, which stands still and gets no new voxel"
@@ -117,6 +120,9 @@ std::string assumedOf(const Outcome& outcome, const IntendedPath& path) {
     text << (text.tellp() > 0 ? ", '" : "'") << outcome.step->bodies[of.body].name << "'";
   text << " go along the intended path, at no more than its pace, within " << path.deviation_m << " m and "
        << path.deviation_rate_m_s << " m/s";
+  for (const IntendedPath::Of& of : path.bodies)
+    if (of.frameOf() != of.body)
+      text << ", and '" << outcome.step->bodies[of.body].name << "' " << of.relative_m_s << " m/s more";
   return text.str();
 }
 

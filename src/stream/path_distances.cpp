@@ -59,7 +59,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
   one.is_known = true;
   const IntendedPath::Of* const of = path_->find(number);
   one.pose = of ? &of->pose : nullptr;
-  const Eigen::Isometry3d to_local = one.pose ? body.pose_t1.inverse() : Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d to_local = of ? outcome_->step->bodies[of->frameOf()].pose_t1.inverse() : Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3d box(Vec3::Zero());
   box.setEmpty();
   one.local.clear();

@@ -98,9 +98,10 @@ class Search {
       bool slows = true;
       for (const std::uint16_t body : row.body) {
         if (body == OBSTACLE_BODY) continue;
-        if (path_.find(body)) {
+        if (const IntendedPath::Of* const of = path_.find(body)) {
           ++pair.on_path;
-          slows = slows && full_[body].slows_down;
+          pair.rate_m_s += of->relative_m_s;
+          slows = slows && full_[of->frameOf()].slows_down;
         } else {
           (full_[body].slows_down ? pair.slowed_m_s : pair.other_m_s) = full_[body].max_m_s;
           pair.closing_m_s = after_[body].max_m_s;
@@ -116,7 +117,7 @@ class Search {
       pair.touches = row.at_end.status == ClearanceStatus::TOUCHING;
       pair.most_m = std::max(pair.start_m, row.at_end.upper_m);
       pair.deviation_m = static_cast<double>(pair.on_path) * path_.deviation_m;
-      pair.rate_m_s = static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
+      pair.rate_m_s += static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
       pair.allowed_s = allowed >= 1 ? SpeedBound::NONE : law_ ? PathPace{*law_}.timeOf(allowed) : 0;
       pair.may_scale = slows && std::isfinite(pair.slowed_m_s) && std::isfinite(pair.other_m_s);
       pair.may_stand = pair.may_scale && pair.other_m_s == 0 && row.at_end.status != ClearanceStatus::UNKNOWN;
@@ -334,7 +335,7 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
     Positions local;
     Eigen::AlignedBox3d box;
     for (const Vec3& p : *body.t1) {
-      local.push_back(body.pose_t1.inverse() * p);
+      local.push_back(outcome.step->bodies[of.frameOf()].pose_t1.inverse() * p);
       box.extend(local.back());
     }
     const std::array<Vec3, 8> corners = cornersOf(box);
@@ -342,7 +343,7 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
       constexpr double NO_PACE_S = 2e-9;
       const double lasts_s = path.time_s[k + 1] - path.time_s[k];
       if (lasts_s < NO_PACE_S) continue;
-      const double most_m = bounds[of.body].max_m_s * lasts_s * (1 + 1e-9) + 1e-12;
+      const double most_m = (bounds[of.body].max_m_s + of.relative_m_s) * lasts_s * (1 + 1e-9) + 1e-12;
       const auto isTooFar = [&](const Vec3& p) { return (of.pose[k + 1] * p - of.pose[k] * p).norm() > most_m; };
       if (std::none_of(corners.begin(), corners.end(), isTooFar) || std::none_of(local.begin(), local.end(), isTooFar))
         continue;
