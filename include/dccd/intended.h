@@ -119,7 +119,7 @@ struct FirstTouch {
 /// Theorem (scale). At a scale s the bodies pass the path up to x = s T_r + s^2 T_s / 2 until they stand, W = T_r + s
 /// T_s after the step's end. If D(x) is at least the tubes at W + v_h W + v_r x + C (v_r of what slows down and is not
 /// on the path), the two do not touch before all stands, which leaves C. A pair may also be as fast as its bounds
-/// alone allow, or, the standing rule,
+/// alone allow, or, the standing rule, if all of it slows down,
 /// - if it comes no nearer on the path than where it begins, but for the tolerance of distances and bend_m; or
 /// - where it touches: if there is a plane that has all of the body in front of it, the body's least height over it at
 ///   no end of a piece up to x is less than at its begin, and what of the partner, which is not on the path, is not

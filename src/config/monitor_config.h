@@ -58,6 +58,11 @@ struct IntentConfig {
   double deviation_m = 0, deviation_rate_m_s = 0;
 };
 
+/// The parameters under `limits`: of ~limits.
+struct LimitsConfig {
+  double max_m = 0, horizon_s = 0;
+};
+
 struct MarkerConfig {
   double point_size_m = 0.01;
   int max_contacts = 2000;  ///< the first ones are shown
@@ -95,6 +100,7 @@ struct MonitorConfig {
   double max_acceleration_m_s2 = 0;    ///< the same
   std::optional<SpeedLaw> speed_law;   ///< of ~speed_scale; none: nobody asks for it
   std::optional<IntentConfig> intent;  ///< of ~intended; none: nobody listens to it
+  std::optional<LimitsConfig> limits;  ///< of ~limits; none: it is off
   /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
   std::vector<Expectation> expected_contacts;
   std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from

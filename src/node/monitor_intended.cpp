@@ -53,6 +53,13 @@ AlongPath MonitorPipeline::searchAlong(const IntendedPath& path, FirstTouch* fir
   return path_search_.run(*answered_, options, speedBounds(), config_.speed_law, path, deadline, first);
 }
 
+ApproachLimits MonitorPipeline::limitsAfter(const Outcome& outcome) {
+  const Options& options = monitor_->options().detector;
+  const Deadline deadline = Deadline::after(tolerance::LOOK_AHEAD_SHARE * timeLimitMs(options));
+  return approach_search_.run(outcome, options, speedBounds(), config_.limits->max_m, config_.limits->horizon_s,
+                              deadline);
+}
+
 /// Whatever it throws, what the bounds alone allow stands.
 void MonitorPipeline::followIntended() {
   const Step& step = *answered_->step;

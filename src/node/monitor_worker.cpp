@@ -225,6 +225,13 @@ void CollisionMonitor::Impl::publishAhead(const Outcome& outcome) {
     if (along.rests_on_path) promise.assumed.push_back(assumedOf(outcome, path));
     outputs.publishSafeUntil(promise);
   }
+  if (config.limits) {
+    outputs.publishLimits([&] {
+      if (outcome.answered && !pipeline.statement().assurance.proved)  // or its promises are void
+        return toLimits(outcome, {{}, {}, config.limits->horizon_s, 0, {"the step is not proved"}}, {}, frame);
+      return toLimits(outcome, pipeline.limitsAfter(outcome), pipeline.speedBounds(), frame);
+    });
+  }
   if (!config.intent) return;
   outputs.publishAlongPath(toAlongPath(outcome, path, along, frame));
   const std::string problem = pipeline.takeIntendedProblem();

@@ -33,6 +33,7 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   }
   if (config.promises()) safe_until_ = node.advertise<deformable_ccd::SafeUntil>("safe_until", TOPIC_QUEUE, true);
   if (config.intent) along_path_ = node.advertise<deformable_ccd::AlongPath>("along_path", TOPIC_QUEUE);
+  if (config.limits) limits_ = node.advertise<deformable_ccd::Limits>("limits", TOPIC_QUEUE);
 }
 
 std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vector<Body>& bodies,
@@ -93,6 +94,9 @@ void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, con
 
 void Outputs::publishSafeUntil(const deformable_ccd::SafeUntil& message) { safe_until_.publish(message); }
 
+void Outputs::publishLimits(const std::function<deformable_ccd::Limits()>& make) {
+  if (limits_ && limits_.getNumSubscribers() > 0) limits_.publish(make());
+}
 void Outputs::publishAlongPath(const deformable_ccd::AlongPath& message) { along_path_.publish(message); }
 
 void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <tuple>
 
 #include "output/output_messages.h"
 
@@ -111,6 +112,39 @@ deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath
   for (const IntendedPath::Of& of : path.bodies) out.bodies.push_back(outcome.step->bodies[of.body].name);
   out.ahead = path.endsAt();
   out.contact = static_cast<std::uint8_t>(along.contact);
+  return out;
+}
+
+deformable_ccd::Limits toLimits(const Outcome& outcome, const ApproachLimits& limits,
+                                const std::vector<SpeedBound>& bounds, const std::string& frame) {
+  deformable_ccd::Limits out;
+  out.header = headerOf(outcome.stamp_ns, frame);
+  out.horizon = limits.horizon_s;
+  out.most_speed = limits.most_speed_m_s;
+  out.unknown = limits.unknown;
+  out.assumed = assumptions(outcome, bounds);
+  const auto point = [](const Vec3& p) {
+    geometry_msgs::Point at;
+    std::tie(at.x, at.y, at.z) = std::tie(p.x(), p.y(), p.z());
+    return at;
+  };
+  for (const std::uint16_t number : limits.bodies) {
+    const Body& body = outcome.step->bodies[number];
+    out.links.push_back(body.name);
+    out.origins.push_back(point(body.pose_t1.translation()));
+    double reach_m = 0;
+    for (const Vec3& p : *body.t1) reach_m = std::max(reach_m, (p - body.pose_t1.translation()).norm());
+    out.reaches.push_back(reach_m);
+  }
+  for (const ApproachLimit& limit : limits.of) {
+    const auto link = std::find(limits.bodies.begin(), limits.bodies.end(), limit.body);
+    out.link.push_back(static_cast<std::uint32_t>(link - limits.bodies.begin()));
+    out.partners.push_back(limit.partner == OBSTACLE_BODY ? "octomap" : outcome.step->bodies[limit.partner].name);
+    for (const Vec3& corner : limit.corner) out.corners.push_back(point(corner));
+    geometry_msgs::Vector3& normal = out.normals.emplace_back();
+    std::tie(normal.x, normal.y, normal.z) = std::tie(limit.normal.x(), limit.normal.y(), limit.normal.z());
+    out.speeds.push_back(limit.speed_m_s);
+  }
   return out;
 }
 

@@ -99,6 +99,7 @@ Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector
       double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
       if (!std::isfinite(bound)) speeds.unbounded = outcome.step->bodies[body].name;
       sum = sum == 0 ? bound : roundedUp(sum + bound);
+      speeds.slows = speeds.slows || (bounds[body].slows_down && bounds[body].max_m_s > 0);
     }
     return speeds;
   };

@@ -6,6 +6,7 @@
 
 #include "dccd/mesh_store.h"
 #include "step/parts.h"
+#include "stream/body_trees.h"
 #include "stream/radii.h"
 
 namespace dccd {
@@ -45,14 +46,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
   Shape& one = shapes_[number];
   if (one.is_known) return one;
   const Body& body = outcome_->step->bodies[number];
-  Body& setup = one.setup.setup;
-  if (setup.topology != body.topology || setup.vertex_mask != body.vertex_mask) {
-    one = Shape();
-    setup.topology = body.topology;
-    setup.vertex_mask = body.vertex_mask;
-    one.setup.slot_vertex.assign(body.topology->usedVertices().begin(), body.topology->usedVertices().end());
-    if (!body.vertex_mask.empty()) one.setup.asked.assign(body.topology->vertexCount(), 1);
-    for (const Index v : body.vertex_mask) one.setup.asked[v] = 0;
+  if (takesMesh(body, one.setup)) {
     one.moving.build(one.setup, *body.t1);
     one.still = one.moving;
   }
@@ -69,7 +63,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
     const bool is_asked = one.setup.asked.empty() || one.setup.asked[v];
     const Vec3 p = is_asked ? Vec3(to_local * (*body.t1)[v]) : Vec3(Vec3::Zero());
     one.local.push_back(p);
-    one.rest.push_back({{p[0], p[1], p[2], 0}, {p[0], p[1], p[2], 0}});
+    one.rest.push_back(atRestAt(p));
     if (is_asked) box.extend(p);
     one.reach_m = std::max(one.reach_m, p.norm());
   }

@@ -91,17 +91,18 @@ class Search {
       const Speeds by_bounds = speedsOf(outcome_, row, after_), at_full = speedsOf(outcome_, row, full_);
       if (by_bounds.unbounded.empty() && pair.start_m > 0) pair.apart_s = secondsTo(pair.start_m, by_bounds.closing());
       double allowed = 1;
-      if (law_ && !isItself(row) && at_full.slowed > 0) {
+      if (law_ && !isItself(row) && at_full.slows) {
         const bool is_known = at_full.unbounded.empty() && pair.start_m > 0;
         allowed = is_known ? dccd::speedScale(pair.start_m, at_full.slowed, at_full.other, *law_) : 0;
       }
-      bool slows = true;
+      bool slows = true, swings_on = false;  // what is on the path; what it carries, when all stands
       for (const std::uint16_t body : row.body) {
         if (body == OBSTACLE_BODY) continue;
         if (const IntendedPath::Of* const of = path_.find(body)) {
           ++pair.on_path;
           pair.rate_m_s += of->relative_m_s;
           slows = slows && full_[of->frameOf()].slows_down;
+          swings_on = swings_on || !full_[body].slows_down;
         } else {
           (full_[body].slows_down ? pair.slowed_m_s : pair.other_m_s) = full_[body].max_m_s;
           pair.closing_m_s = after_[body].max_m_s;
@@ -120,7 +121,7 @@ class Search {
       pair.rate_m_s += static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
       pair.allowed_s = allowed >= 1 ? SpeedBound::NONE : law_ ? PathPace{*law_}.timeOf(allowed) : 0;
       pair.may_scale = slows && std::isfinite(pair.slowed_m_s) && std::isfinite(pair.other_m_s);
-      pair.may_stand = pair.may_scale && pair.other_m_s == 0 && row.at_end.status != ClearanceStatus::UNKNOWN;
+      pair.may_stand = pair.may_scale && pair.other_m_s == 0 && !swings_on && row.at_end.status != ClearanceStatus::UNKNOWN;
       pair.way = distances_.wayOf(pair.body);
       pairs_.push_back(std::move(pair));
     });

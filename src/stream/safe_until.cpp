@@ -240,7 +240,7 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
   forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
     if (!counts(outcome, pair) || isItself(pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
-    if (speeds.slowed == 0) return;
+    if (!speeds.slows) return;
     const double distance_m = distanceOf(outcome, insides, pair);
     const bool bounded = speeds.unbounded.empty();
     const double scale = bounded && distance_m > 0 ? speedScale(distance_m, speeds.slowed, speeds.other, law) : 0;

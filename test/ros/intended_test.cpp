@@ -1,5 +1,6 @@
 // ~intended of a live node: a motion of the robot's joints, one that is wrong, and an arm that leaves it.
 #include <deformable_ccd/AlongPath.h>
+#include <deformable_ccd/Limits.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
 #include <deformable_ccd/WouldTouch.h>
@@ -152,6 +153,21 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
     });
   }));
   EXPECT_TRUE(waitUntil([&] { return std::abs(promises.last().seconds - 0.149 / 0.6) < 1e-3; }));
+}
+
+TEST_F(Intended, LimitsTellAControllerHowFastThePlateMayComeUp) {
+  Probe<deformable_ccd::Limits> limits(node, name + "/limits");
+  EXPECT_TRUE(waitUntil([&] { return limits.count() > 0 && limits.last().speeds.size() == 1; }));
+  const deformable_ccd::Limits said = limits.last();
+  EXPECT_TRUE(said.unknown.empty());
+  EXPECT_EQ(said.links, std::vector<std::string>{"plate"});
+  EXPECT_EQ(said.partners, std::vector<std::string>{"mesh"});
+  EXPECT_NEAR(said.origins.at(0).z, 0.1, 1e-9);
+  EXPECT_NEAR(std::abs(said.normals.at(0).z), 1, 1e-6);
+  EXPECT_NEAR(said.speeds[0], 0.099 / 0.2 - 0.1, 0.01);
+  EXPECT_NEAR(said.most_speed, 0.4 / 0.2 - 0.1, 1e-6);
+  EXPECT_EQ(said.corners.size(), 8u);
+  EXPECT_FALSE(said.assumed.empty());
 }
 
 TEST_F(Intended, APlannerAsksBeforeItSends) {
