@@ -191,17 +191,20 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
                                                             const Lookup& lookup) {
   Motion& motion = motions_.front();
   std::vector<CarriedBody> on_it;
+  bool moves_one = false;
   for (const CarriedBody& one : carried) {
     if (!tree_->hasLink(one.frame)) continue;
     const std::set<std::string> joints = tree_->jointsTo(one.frame);
     const auto named = std::count_if(motion.joints.begin(), motion.joints.end(),
                                      [&](const std::string& name) { return joints.count(name) > 0; });
     if (named > 0 && joints.size() > static_cast<std::size_t>(named)) moved_by_others_ = one.frame;
-    if (named > 0 && joints.size() == static_cast<std::size_t>(named)) on_it.push_back(one);
+    if (joints.size() != static_cast<std::size_t>(named)) continue;
+    on_it.push_back(one);  // what no joint moves stands still
+    moves_one = moves_one || named > 0;
   }
   const std::optional<Eigen::Isometry3d> base = lookup(tree_->root(), step.stamp_ns);
-  if (on_it.empty() || !base) {
-    drop(on_it.empty() ? "joint_names: they move no link that is watched, or not alone"
+  if (!moves_one || !base) {
+    drop(!moves_one ? "joint_names: they move no link that is watched, or not alone"
                        : "has no place: nobody knows where '" + tree_->root() + "' is");
     return std::nullopt;
   }

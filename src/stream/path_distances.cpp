@@ -176,7 +176,8 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
   return off_m * ABOVE + arcOf(way, stretch);
 }
 
-double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {
+double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m,
+                           bool only_whether) {
   const bool with_map = way.still == OBSTACLE_BODY;
   found_ = {};
   if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;
@@ -186,7 +187,8 @@ double PathDistances::over(const Way& way, const Stretch& stretch, double enough
   ++questions_;
   const double taken_m =
       place(way, stretch) + shapes_[way.mover].radius_m + (with_map ? 0 : shapes_[way.still].radius_m);
-  const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_, nullptr};
+  const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE,          false, deadline_,
+                                 nullptr,     only_whether ? enough_m + taken_m : 0};
   const auto never = [](std::uint32_t, std::uint32_t) { return true; };  // is asked of what is at the end alone
   const NearestSearch::AllPairs all;
   found_ = with_map ? search_.run(tree, map_, all, goal, {}, never)

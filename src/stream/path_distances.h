@@ -37,8 +37,8 @@ class DCCD_HIDDEN PathDistances {
 
   /// A lower bound of the two surfaces' distance over the stretch, less their radii and by how much the path's pieces
   /// leave the straight ways through it [m]. Within the tolerance, but for these, of what is true where that is below
-  /// enough_m. 0: nobody knows.
-  double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m);
+  /// enough_m, unless only that matters. 0: nobody knows.
+  double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m, bool only_whether = false);
   /// Where the two are nearest at a time, between them, in the fixed frame; NaN: nobody knows.
   Vec3 nearest(const Way& way, double time_s);
   /// How far any vertex of the mover comes from where it is when the stretch begins, at most [m].

@@ -140,8 +140,9 @@ class Search {
   }
 
   /// What is between the two at least over the stretch, but for bends: by what was asked before, where that is enough,
-  /// or asked now.
-  double distanceOver(PathPair& pair, const Stretch& stretch, double enough_m, double tolerance_m) {
+  /// or asked now: of less than that any bound, if only that matters.
+  double distanceOver(PathPair& pair, const Stretch& stretch, double enough_m, double tolerance_m,
+                      bool only_whether = false) {
     double least_m = pair.start_m - distances_.goneBy(pair.way, {0, stretch.to_s});
     for (const PathPair::Asked& one : pair.asked) {
       if (one.of.from_s == stretch.from_s && one.of.to_s == stretch.to_s && one.enough_m >= enough_m &&
@@ -155,8 +156,9 @@ class Search {
     }
     if (least_m >= enough_m || !mayGoOn(pair)) return std::max(0.0, least_m);
     const double asked_m = enough_m + pair.separation_m;
-    const double found_m = (distances_.over(pair.way, stretch, asked_m, tolerance_m) - pair.separation_m) * (1 - 1e-12);
-    pair.asked.push_back({stretch, enough_m, tolerance_m, std::max({0.0, least_m, found_m})});
+    const double found_m = (distances_.over(pair.way, stretch, asked_m, tolerance_m, only_whether) - pair.separation_m) * (1 - 1e-12);
+    const double of_m = only_whether && found_m < enough_m ? 0 : enough_m;  // another time it may matter
+    pair.asked.push_back({stretch, of_m, tolerance_m, std::max({0.0, least_m, found_m})});
     return pair.asked.back().least_m;
   }
 
@@ -185,7 +187,7 @@ class Search {
     const auto holds = [&](const Stretch& stretch) {
       // What arcs take off is given back: their ends are on the straight ways, which come no nearer.
       const double held_m = least_m - distances_.arcOf(pair.way, stretch);
-      return held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_) >= held_m;
+      return held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_, true) >= held_m;
     };
     const auto may_halve = [&](const Stretch& stretch) {
       return distances_.pieceEnd(stretch.from_s) < stretch.to_s && mayGoOn(pair);

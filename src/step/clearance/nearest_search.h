@@ -46,6 +46,7 @@ class NearestSearch {
     bool at_end = false;                  ///< at t1 alone
     Deadline deadline;
     const std::array<std::uint32_t, 2>* first = nullptr;  ///< items to begin with, probably near; null: none
+    double gives_up_m = 0;  ///< once two are nearer than this, how near they are does not matter
   };
   /// Of two different trees every pair of items is compared.
   struct AllPairs {
@@ -81,7 +82,7 @@ class NearestSearch {
         }
       }
       Pair pair = take();
-      const bool is_done = prunes(pair.squared);            // nothing else is nearer
+      const bool is_done = prunes(pair.squared) || found_.upper_m < goal_.gives_up_m;  // nothing else is nearer, or asked
       if (is_done || (plane_ > 0 ? isOver() : isLate())) {  // boxes along a plane take long
         found_.cut = found_.cut || !is_done;
         settleSquared(pair.squared);
