@@ -176,7 +176,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
   return off_m * ABOVE + arcOf(way, stretch);
 }
 
-double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m,
+double PathDistances::over(Way& way, const Stretch& stretch, double enough_m, double tolerance_m,
                            bool only_whether) {
   const bool with_map = way.still == OBSTACLE_BODY;
   found_ = {};
@@ -187,17 +187,19 @@ double PathDistances::over(const Way& way, const Stretch& stretch, double enough
   ++questions_;
   const double taken_m =
       place(way, stretch) + shapes_[way.mover].radius_m + (with_map ? 0 : shapes_[way.still].radius_m);
-  const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE,          false, deadline_,
-                                 nullptr,     only_whether ? enough_m + taken_m : 0};
+  NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_};
+  if (way.near) goal.near = &*way.near;
+  if (only_whether) goal.gives_up_m = enough_m + taken_m;
   const auto never = [](std::uint32_t, std::uint32_t) { return true; };  // is asked of what is at the end alone
   const NearestSearch::AllPairs all;
   found_ = with_map ? search_.run(tree, map_, all, goal, {}, never)
                     : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
+  if (std::isfinite(found_.upper_m)) way.near = found_.item;
   const double rest_m = found_.lower_m - taken_m - (ABOVE - 1) * found_.lower_m;
   return rest_m > 0 ? rest_m : 0;
 }
 
-Vec3 PathDistances::nearest(const Way& way, double time_s) {
+Vec3 PathDistances::nearest(Way& way, double time_s) {
   over(way, {time_s, time_s}, LARGEST_M, 1e-6);
   if (!std::isfinite(found_.upper_m)) return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   const Vec3 between = (found_.point[0] + found_.point[1]) / 2;

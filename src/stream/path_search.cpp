@@ -64,7 +64,7 @@ class Search {
     FirstTouch first;
     first.free_s = farthest(Goal::UNTIL, path_.endsAt());
     if (!failing_) return first;
-    const PathPair& pair = pairs_[*failing_];
+    PathPair& pair = pairs_[*failing_];
     first.body = pair.body;
     first.point = distances_.nearest(pair.way, first.free_s);
     if (pair.start_m == 0 && !pair.touches) {

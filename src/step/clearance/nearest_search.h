@@ -46,6 +46,7 @@ class NearestSearch {
     bool at_end = false;                  ///< at t1 alone
     Deadline deadline;
     const std::array<std::uint32_t, 2>* first = nullptr;  ///< items to begin with, probably near; null: none
+    const std::array<std::uint32_t, 2>* near = nullptr;  ///< the same, of other places of the two
     double gives_up_m = 0;  ///< once two are nearer than this, how near they are does not matter
   };
   /// Of two different trees every pair of items is compared.
@@ -71,7 +72,8 @@ class NearestSearch {
         if (prunesAll(a, b)) return result();
       }
     } else if (!pairs.ITSELF) {
-      compareNearBoxes(a, b, meet);
+      if (goal.near) compare(a, b, {0, 0, (*goal.near)[0], (*goal.near)[1], true}, meet);
+      else compareNearBoxes(a, b, meet);
     }
     push(a, a.root(), b, b.root(), pairs);
     for (std::uint32_t taken = 0; !touching_.empty() || !heap_.empty(); ++taken) {
