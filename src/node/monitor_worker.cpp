@@ -190,7 +190,7 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   if (!publish) publish = outputs.makeResult(outcome, bodies, frame);
   publish();
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
-  outputs.publishMarkers(outcome, bodies, config.markers, frame);
+  outputs.publishMarkers(outcome, bodies, config.markers, frame, pipeline.intended().path);
   publishEffects(toRosTime(outcome.stamp_ns));
   predict(outcome);
   if (outputs.wantsStats()) {

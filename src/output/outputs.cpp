@@ -62,9 +62,11 @@ std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vec
 }
 
 void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
-                             const std::string& frame) {
+                             const std::string& frame, const IntendedPath& path) {
   if (markers_.getNumSubscribers() == 0 || frame.empty()) return;
-  markers_.publish(toMarkers(outcome, bodies, markers, frame));
+  visualization_msgs::MarkerArray array = toMarkers(outcome, bodies, markers, frame);
+  addPath(outcome, path, frame, array);
+  markers_.publish(array);
 }
 
 void Outputs::publishStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {

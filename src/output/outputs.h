@@ -26,7 +26,7 @@ class Outputs {
   /// call of what is returned publishes them, once, before another list is made.
   std::function<void()> makeResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
   void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
-                      const std::string& frame);
+                      const std::string& frame, const IntendedPath& path);
   /// After the step's prediction, which it tells of.
   void publishStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
   /// Whether anybody listens to statistics.
