@@ -64,7 +64,8 @@ class GuardTwist {
     }
     double reach_m = 0;
     for (std::size_t l = 0; l < said.links.size(); ++l)
-      if (moves(said.links[l])) reach_m = std::max(reach_m, (vectorOf(said.origins[l]) - origin).norm() + said.reaches[l]);
+      if (moves(said.links[l]))
+        reach_m = std::max(reach_m, (vectorOf(said.origins[l]) - origin).norm() + said.reaches[l]);
     bool is_found = false;
     twist = guard::nearest(rows, twist, is_found);
     const double fastest = twist.head<3>().norm() + twist.tail<3>().norm() * reach_m;

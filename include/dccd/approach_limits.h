@@ -30,10 +30,10 @@ struct ApproachLimit {
 /// speed_m_s <= (d - r) / h - v, what is between the two along the normal is at least d - (speed_m_s + v) t > r for t
 /// up to h; of the others it is max_m - (most_speed_m_s + v) t. A body that is apart at all times is not inside either.
 /// Corollary. The first holds if the body's origin o goes straight by u, while it turns evenly by w about it, and for
-/// each corner c n.(u + w x (c - o)) + |w|^2 h |c - o| / 2 <= speed_m_s: a turn by |w| t takes a corner off the straight
-/// way by no more than (|w| t)^2 |c - o| / 2.
-/// What is assumed is what SafeUntil assumes. What a body carries (SpeedBound::carrier) is not spoken of against it, and
-/// nothing but rigid bodies is as what moves: a cloth in the hand goes where it may.
+/// each corner c n.(u + w x (c - o)) + |w|^2 h |c - o| / 2 <= speed_m_s: a turn by |w| t takes a corner off the
+/// straight way by no more than (|w| t)^2 |c - o| / 2. What is assumed is what SafeUntil assumes. What a body carries
+/// (SpeedBound::carrier) is not spoken of against it, and nothing but rigid bodies is as what moves: a cloth in the
+/// hand goes where it may.
 struct ApproachLimits {
   std::vector<ApproachLimit> of;
   std::vector<std::uint16_t> bodies;  ///< that are spoken of

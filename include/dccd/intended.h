@@ -38,7 +38,7 @@ struct IntendedPath {
   double endsAt() const { return time_s.empty() ? 0 : time_s.back(); }
   double tubeAt(double ahead_s) const { return deviation_m + deviation_rate_m_s * ahead_s; }
   const Of* find(std::size_t body) const;  ///< null: it is not on it
-  std::size_t pieceAt(double at_s) const;    ///< that holds the time; the last one at the end
+  std::size_t pieceAt(double at_s) const;  ///< that holds the time; the last one at the end
   double shareAt(std::size_t piece, double at_s) const;
 };
 

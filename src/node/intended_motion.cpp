@@ -205,7 +205,7 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
   const std::optional<Eigen::Isometry3d> base = lookup(tree_->root(), step.stamp_ns);
   if (!moves_one || !base) {
     drop(!moves_one ? "joint_names: they move no link that is watched, or not alone"
-                       : "has no place: nobody knows where '" + tree_->root() + "' is");
+                    : "has no place: nobody knows where '" + tree_->root() + "' is");
     return std::nullopt;
   }
   if (motion.last.stamp_ns < step.stamp_ns) motion.before = motion.last;

@@ -169,9 +169,8 @@ bool addLimits(const FeatureTree& body, const Eigen::Isometry3d& to, const Partn
 
 }  // namespace
 
-ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& options,
-                                   const std::vector<SpeedBound>& given, double max_m, double horizon_s,
-                                   Deadline deadline) {
+ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& options, const std::vector<SpeedBound>& given,
+                                   double max_m, double horizon_s, Deadline deadline) {
   const ScopedFloatMode mode;
   ApproachLimits result;
   result.horizon_s = horizon_s;

@@ -106,7 +106,8 @@ Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector
   const auto isCarried = [&](std::uint16_t body) { return bounds[body].carrier != SpeedBound::NO_CARRIER; };
   const auto frameOf = [&](std::uint16_t body) { return isCarried(body) ? bounds[body].carrier : body; };
   const Speeds speeds = sumOf([&](std::uint16_t body) { return bounds[body].max_m_s; });
-  const bool by_one = !isItself(pair) && pair.body[1] != OBSTACLE_BODY && frameOf(pair.body[0]) == frameOf(pair.body[1]);
+  const bool by_one =
+      !isItself(pair) && pair.body[1] != OBSTACLE_BODY && frameOf(pair.body[0]) == frameOf(pair.body[1]);
   if (!by_one) return speeds;
   const Speeds relative = sumOf([&](std::uint16_t body) { return isCarried(body) ? bounds[body].relative_m_s : 0; });
   return relative.closing() <= speeds.closing() ? relative : speeds;

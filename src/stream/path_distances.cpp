@@ -53,7 +53,8 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
   one.is_known = true;
   const IntendedPath::Of* const of = path_->find(number);
   one.pose = of ? &of->pose : nullptr;
-  const Eigen::Isometry3d to_local = of ? outcome_->step->bodies[of->frameOf()].pose_t1.inverse() : Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d to_local =
+      of ? outcome_->step->bodies[of->frameOf()].pose_t1.inverse() : Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3d box(Vec3::Zero());
   box.setEmpty();
   one.local.clear();
@@ -176,8 +177,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
   return off_m * ABOVE + arcOf(way, stretch);
 }
 
-double PathDistances::over(Way& way, const Stretch& stretch, double enough_m, double tolerance_m,
-                           bool only_whether) {
+double PathDistances::over(Way& way, const Stretch& stretch, double enough_m, double tolerance_m, bool only_whether) {
   const bool with_map = way.still == OBSTACLE_BODY;
   found_ = {};
   if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;

@@ -121,7 +121,8 @@ class Search {
       pair.rate_m_s += static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
       pair.allowed_s = allowed >= 1 ? SpeedBound::NONE : law_ ? PathPace{*law_}.timeOf(allowed) : 0;
       pair.may_scale = slows && std::isfinite(pair.slowed_m_s) && std::isfinite(pair.other_m_s);
-      pair.may_stand = pair.may_scale && pair.other_m_s == 0 && !swings_on && row.at_end.status != ClearanceStatus::UNKNOWN;
+      pair.may_stand =
+          pair.may_scale && pair.other_m_s == 0 && !swings_on && row.at_end.status != ClearanceStatus::UNKNOWN;
       pair.way = distances_.wayOf(pair.body);
       pairs_.push_back(std::move(pair));
     });
@@ -156,7 +157,8 @@ class Search {
     }
     if (least_m >= enough_m || !mayGoOn(pair)) return std::max(0.0, least_m);
     const double asked_m = enough_m + pair.separation_m;
-    const double found_m = (distances_.over(pair.way, stretch, asked_m, tolerance_m, only_whether) - pair.separation_m) * (1 - 1e-12);
+    const double found_m =
+        (distances_.over(pair.way, stretch, asked_m, tolerance_m, only_whether) - pair.separation_m) * (1 - 1e-12);
     const double of_m = only_whether && found_m < enough_m ? 0 : enough_m;  // another time it may matter
     pair.asked.push_back({stretch, of_m, tolerance_m, std::max({0.0, least_m, found_m})});
     return pair.asked.back().least_m;

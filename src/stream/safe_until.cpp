@@ -132,7 +132,8 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
         say("body '" + before.name + "' has another mesh");
         continue;
       }
-      if (const std::string left = leftCarrier(*step_, *outcome.step, b, assumed_[b], time_ns); !left.empty()) say(left);
+      if (const std::string left = leftCarrier(*step_, *outcome.step, b, assumed_[b], time_ns); !left.empty())
+        say(left);
       if (!std::isfinite(assumed_[b].max_m_s)) continue;
       bool was_faster = false;
       const auto look = [&](const Positions& from, const Positions& to, StampNs ns) {

@@ -110,8 +110,9 @@ class Chase {
 
   /// The least distance until then, of bodies that pass the path as `place` says: of each time its time on the path.
   double leastUntil(double until_s, const std::function<double(double)>& place) {
-    return leastOf(until_s, [&](double t) { return pose(std::min(place(t), horizon_s)); }, path_.deviation_m,
-                   path_.deviation_rate_m_s);
+    return leastOf(
+        until_s, [&](double t) { return pose(std::min(place(t), horizon_s)); }, path_.deviation_m,
+        path_.deviation_rate_m_s);
   }
   double leastOf(double until_s, const std::function<Eigen::Isometry3d(double)>& poseThen, double tube_m,
                  double tube_m_s) {

@@ -27,8 +27,9 @@ namespace {
 // says, less what it went since the stamp, and aside as it likes, until the limits are old or something is unknown.
 TEST(GuardTwist, BothClientsChangeTheTwistLeastAndStandWhereNothingIsKnown) {
   ros::NodeHandle node;
-  std::array<Probe<geometry_msgs::TwistStamped>, 2> twists{Probe<geometry_msgs::TwistStamped>(node, "/guard_cpp/twist"),
-                                                           Probe<geometry_msgs::TwistStamped>(node, "/guard_python/twist")};
+  std::array<Probe<geometry_msgs::TwistStamped>, 2> twists{
+      Probe<geometry_msgs::TwistStamped>(node, "/guard_cpp/twist"),
+      Probe<geometry_msgs::TwistStamped>(node, "/guard_python/twist")};
   ros::Publisher monitor = advertiseAndWait<deformable_ccd::Limits>(node, "/played/limits", false, 2);
   ros::Publisher wanted = advertiseAndWait<geometry_msgs::TwistStamped>(node, "/wanted", false, 2);
   deformable_ccd::Limits limits;
@@ -59,7 +60,8 @@ TEST(GuardTwist, BothClientsChangeTheTwistLeastAndStandWhereNothingIsKnown) {
         const auto& v = told.last().twist.linear;
         return told.count() > 0 && std::abs(v.z + down_m_s) < 0.03 && std::abs(v.x - aside_m_s) < 1e-6;
       });
-    })) << why << ": " << twists[0].last().twist.linear << twists[1].last().twist.linear;
+    })) << why
+        << ": " << twists[0].last().twist.linear << twists[1].last().twist.linear;
   };
   expectTwist(true, 0.2, 0.3, "down as fast as it may");
   expectTwist(false, 0, 0, "the limits are old");

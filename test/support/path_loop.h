@@ -114,7 +114,7 @@ class PathLoop {
       const Vec3 hangs = from + down_m * Vec3(std::sin(angle_), 0, -std::cos(angle_));
       const bool is_bent = from.x() > edge_m;
       const Vec3 corner(edge_m, p.y(), top_m);
-      p = !is_bent ? Vec3(std::min(hangs.x(), std::max(edge_m, from.x())), p.y(), hangs.z())
+      p = !is_bent             ? Vec3(std::min(hangs.x(), std::max(edge_m, from.x())), p.y(), hangs.z())
           : down_m < to_edge_m ? Vec3(from + (corner - from) * (down_m / to_edge_m))
                                : Vec3(corner - Vec3(0, 0, down_m - to_edge_m));
     }
@@ -130,7 +130,9 @@ class PathLoop {
     if (cloth_ == Cloth::HANGS) {
       now.push_back(towel(at_m));
       for (std::size_t v = 0; at_m > 0 && v < now[1].size(); ++v)
-        run.left_m_s = std::max(run.left_m_s, (now[1][v] - (*step_.bodies[1].t1)[v] - (tool[0] - (*step_.bodies[0].t1)[0])).norm() / FRAME_S);
+        run.left_m_s =
+            std::max(run.left_m_s,
+                     (now[1][v] - (*step_.bodies[1].t1)[v] - (tool[0] - (*step_.bodies[0].t1)[0])).norm() / FRAME_S);
     } else if (starts_.size() > 1) {
       Positions cloth = starts_[1];
       for (Vec3& p : cloth)

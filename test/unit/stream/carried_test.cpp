@@ -17,7 +17,8 @@ struct HandWithTowel {
   History history;
   HandWithTowel() {
     TestStep scene;
-    scene.bodies = {box({0, 0, 0.5}, {0.1, 0.1, 0.6}), sheet(3, 3, {0, 0, 0.3}, 0.05), box({0, 0, -0.1}, {0.1, 0.1, 0})};
+    scene.bodies = {box({0, 0, 0.5}, {0.1, 0.1, 0.6}), sheet(3, 3, {0, 0, 0.3}, 0.05),
+                    box({0, 0, -0.1}, {0.1, 0.1, 0})};
     step = scene.motion();
     const char* names[] = {"hand", "towel", "pad"};
     for (std::size_t b = 0; b < 3; ++b) {
@@ -88,7 +89,8 @@ TEST(Carried, BoundsThatAreNoneAreNamed) {
   HandWithTowel one;
   const Outcome outcome = detect(one.step, one.options, one.history);
   one.bounds[1].relative_m_s = -1;
-  EXPECT_TRUE(mentions(said<std::invalid_argument>([&] { safeUntil(outcome, one.bounds); }), "'towel' has relative_m_s -1"));
+  EXPECT_TRUE(
+      mentions(said<std::invalid_argument>([&] { safeUntil(outcome, one.bounds); }), "'towel' has relative_m_s -1"));
 }
 
 }  // namespace

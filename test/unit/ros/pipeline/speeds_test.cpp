@@ -88,7 +88,8 @@ TEST(SpeedParameters, MistakesAreNamed) {
            {"bodies: {cloth: {topic: a, carried_by: hand}}\n", "max_relative_speed_m_s"},
            {"bodies: {cloth: {topic: a, carried_by: hand, max_relative_speed_m_s: 1}}\n",
             "carried_by is 'hand', which carries no rigid body or link that is watched"},
-           {"bodies: {cloth: {topic: a}, table: {topic: b, motion: static, carried_by: a, max_relative_speed_m_s: 1}}\n",
+           {"bodies: {cloth: {topic: a}, table: {topic: b, motion: static, carried_by: a, max_relative_speed_m_s: "
+            "1}}\n",
             "carried_by is for what deforms"},
            {"limits: {max_m: 0.1, horizon_s: 0.1}\n", "limits needs distances and a speed bound"},
            {"max_speed_m_s: 1\nlimits: {max_m: 0.1}\n", "limits/horizon_s"},
