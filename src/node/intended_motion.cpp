@@ -187,9 +187,7 @@ std::optional<IntendedPath> IntendedMotion::from(const Step& step, const std::ve
   return motions_.front().isTwist() ? byTwists(step, carried, lookup) : alongTrajectory(step, carried, lookup);
 }
 
-std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
-                                                            const Lookup& lookup) {
-  Motion& motion = motions_.front();
+std::vector<CarriedBody> IntendedMotion::movedBy(const Motion& motion, const std::vector<CarriedBody>& carried) {
   std::vector<CarriedBody> on_it;
   bool moves_one = false;
   for (const CarriedBody& one : carried) {
@@ -199,13 +197,20 @@ std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, co
                                      [&](const std::string& name) { return joints.count(name) > 0; });
     if (named > 0 && joints.size() > static_cast<std::size_t>(named)) moved_by_others_ = one.frame;
     if (joints.size() != static_cast<std::size_t>(named)) continue;
-    on_it.push_back(one);  // what no joint moves stands still
+    on_it.push_back(one);
     moves_one = moves_one || named > 0;
   }
+  return moves_one ? on_it : std::vector<CarriedBody>();
+}
+
+std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
+                                                            const Lookup& lookup) {
+  Motion& motion = motions_.front();
+  const std::vector<CarriedBody> on_it = movedBy(motion, carried);
   const std::optional<Eigen::Isometry3d> base = lookup(tree_->root(), step.stamp_ns);
-  if (!moves_one || !base) {
-    drop(!moves_one ? "joint_names: they move no link that is watched, or not alone"
-                    : "has no place: nobody knows where '" + tree_->root() + "' is");
+  if (on_it.empty() || !base) {
+    drop(on_it.empty() ? "joint_names: they move no link that is watched, or not alone"
+                       : "has no place: nobody knows where '" + tree_->root() + "' is");
     return std::nullopt;
   }
   if (motion.last.stamp_ns < step.stamp_ns) motion.before = motion.last;

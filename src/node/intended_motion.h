@@ -85,6 +85,8 @@ class IntendedMotion {
 
   std::string add(Motion motion, std::string problem, StampNs newest_ns);
   std::string segmentsOf(const trajectory_msgs::JointTrajectory& message, Motion& motion) const;
+  /// What its joints alone move, and what no joint does, which stands still; none: they move nothing alone.
+  std::vector<CarriedBody> movedBy(const Motion& motion, const std::vector<CarriedBody>& carried);
   std::optional<IntendedPath> alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
                                               const Lookup& lookup);
   std::optional<IntendedPath> byTwists(const Step& step, const std::vector<CarriedBody>& carried, const Lookup& lookup);

@@ -12,7 +12,7 @@ CONFIG = ''.join(re.sub(r'choiceOf\((\w+), ', r'\1.choice(', path.read_text()) f
 # What a function of src/config reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/',
             'readDepthImage': 'topology/',
-            'readSpeedLaw': 'speed_scale/', 'readIntent': 'intent/', 'readMarkers': 'markers/', 'readClearance': 'clearance/',
+            'readSpeedLaw': 'speed_scale/', 'readIntent': 'intent/', 'readLimits': 'limits/', 'readMarkers': 'markers/', 'readClearance': 'clearance/',
             'readRobotParameters': 'robot/', 'readSensorModel': 'sensor_model/'}
 # Where a page names a family at once.
 # These read the fields of an entry of a list, which the list's own row explains.
@@ -92,7 +92,8 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
         numbers = numbers_of_bodies()
         self.assertEqual(numbers, {'minimum_separation_m', 'own_voxels_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale',
-                                   'topology/max_edge_m', 'topology/min_range_m', 'topology/max_range_m', 'max_speed_m_s', 'max_acceleration_m_s2'})
+                                   'topology/max_edge_m', 'topology/min_range_m', 'topology/max_range_m', 'max_speed_m_s', 'max_acceleration_m_s2',
+                                   'max_relative_speed_m_s'})
         self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):
