@@ -25,7 +25,7 @@ IntentConfig readIntent(ParameterReader section) {
   return intent;
 }
 
-LimitsConfig readLimits(ParameterReader section) {
+LimitsConfig readApproachLimits(ParameterReader section) {
   LimitsConfig limits;
   limits.max_m = section.number("max_m", 1e-3, LARGE);
   limits.horizon_s = section.number("horizon_s", 1e-3, MOST_PROMISED_S);
@@ -49,7 +49,7 @@ void readSpeeds(ParameterReader& reader, MonitorConfig& config) {
   config.max_acceleration_m_s2 = reader.number("max_acceleration_m_s2", 0.0, 0, LARGE);
   if (reader.has("speed_scale")) config.speed_law = readSpeedLaw(reader.neededSection("speed_scale"));
   if (reader.has("intent")) config.intent = readIntent(reader.neededSection("intent"));
-  if (reader.has("limits")) config.limits = readLimits(reader.neededSection("limits"));
+  if (reader.has("limits")) config.limits = readApproachLimits(reader.neededSection("limits"));
 }
 
 void findCarriers(const ParameterReader& reader, MonitorConfig& config) {
