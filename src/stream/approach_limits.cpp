@@ -145,6 +145,12 @@ class PlanesBetween {
   HullPair pair_;
 };
 
+/// At which a distance lasts for the horizon, less the partner's bound; rounded down.
+double speedFor(double apart_m, double horizon_s, double partner_m_s) {
+  const double speed_m_s = apart_m / horizon_s;
+  return speed_m_s - partner_m_s - 1e-9 * (std::abs(speed_m_s) + partner_m_s);
+}
+
 /// Appends a pair's limits; false: nobody knows enough for them. held_m: what holds the two apart.
 template <class Partner>
 bool addLimits(const FeatureTree& body, const Eigen::Isometry3d& to, const Partner& partner, const Clearance& row,
@@ -161,7 +167,7 @@ bool addLimits(const FeatureTree& body, const Eigen::Isometry3d& to, const Partn
   for (const auto& plane : planes) {
     limit.corner = plane.corners.t1;
     limit.normal = plane.normal;
-    limit.speed_m_s = (plane.apart_m - held_m) / result.horizon_s * (1 - 1e-9) - partner_m_s * (1 + 1e-9);
+    limit.speed_m_s = speedFor(plane.apart_m - held_m, result.horizon_s, partner_m_s);
     result.of.push_back(limit);
   }
   return true;
@@ -205,9 +211,8 @@ ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& option
       } else if (start_m == 0) {
         result.unknown.push_back(zeroReason(outcome, insides, row));
       } else {
-        result.most_speed_m_s =
-            std::min(result.most_speed_m_s, (max_m - held_m) / horizon_s * (1 - 1e-9) - partner_m_s * (1 + 1e-9));
-        if (start_m + held_m > max_m) continue;
+        result.most_speed_m_s = std::min(result.most_speed_m_s, speedFor(max_m - held_m, horizon_s, partner_m_s));
+        if (start_m + held_m * (1 - 2e-9) > max_m) continue;
         const FeatureTree& own = shapes_->of(bodies[link], link).own;
         ApproachLimit limit;
         limit.body = link;
