@@ -275,13 +275,16 @@ class CellTest(FolderTestCase):
         self.assertGreater(len(said), 4)
 
         def faster(message):
-            message.speeds = [speed + 1e-4 for speed in message.speeds]
+            message.speeds = [speed + 0.5 for speed in message.speeds]
 
         def fewer(message):
             message.link, message.partners, message.speeds = message.link[1:], message.partners[1:], message.speeds[1:]
             message.corners, message.normals = message.corners[8:], message.normals[1:]
-        for lie in (faster, fewer, lambda m: setattr(m, 'most_speed', 2 * m.most_speed)):
+        for lie in (faster, fewer):
             self.refuted('limits', lie, 'limits', 'on either side of no half-space')
+        self.cell('near_limits', 'limits: {max_m: 0.05, horizon_s: 0.01}\n')
+        self.holds()
+        self.refuted('limits', lambda m: setattr(m, 'most_speed', 5 * m.most_speed), 'limits', 'on either side of no half-space')
 
     def test_scale(self):
         self.cell('scale')
