@@ -106,7 +106,6 @@ nlohmann::json measure(const Panda& panda, const Scene& scene, int runs) {
     std::sort(body.not_against.begin(), body.not_against.end());
     step.bodies.push_back(std::move(body));
     bounds.push_back({2});
-    if (part.link == "panda_link0") continue;
     path.bodies.push_back({number, {}});
     links.push_back(part.link);
   }

@@ -179,14 +179,14 @@ std::optional<std::pair<Candidate, Runs>> firstWithout(const std::vector<Candida
 }
 
 /// A task that bounds alone do not let an arm do, with ~intended and without it.
-nlohmann::json intendedRow(const std::string& task, const Vec3& way, double height_m, bool with_cloth,
+nlohmann::json intendedRow(const std::string& task, const Vec3& way, double height_m, test::PathLoop::Cloth cloth,
                            std::size_t seeds) {
   nlohmann::json row{{"task", task}, {"seeds", seeds}};
   for (const bool with_path : {true, false}) {
     std::vector<double> speed_m_s, of_free;
     int contacts = 0, arrived = 0;
     for (std::size_t seed = 1; seed <= seeds; ++seed) {
-      test::PathLoop loop(seed, way, height_m, with_cloth);
+      test::PathLoop loop(seed, way, height_m, cloth);
       const test::PathLoop::Run one = loop.run(with_path);
       speed_m_s.push_back(one.mean_m_s);
       of_free.push_back(one.mean_m_s / loop.freeSpeed());
@@ -202,8 +202,10 @@ nlohmann::json intendedRow(const std::string& task, const Vec3& way, double heig
 }
 
 nlohmann::json intendedRows(std::size_t seeds) {
-  return {intendedRow("retreat from a cloth that touches", {0.1, 0, 0.3}, 0, true, seeds),
-          intendedRow("along a table, 20 mm above it", {1, 0, 0}, 0.02, false, seeds)};
+  using Cloth = test::PathLoop::Cloth;
+  return {intendedRow("retreat from a cloth that touches", {0.1, 0, 0.3}, 0, Cloth::LIES, seeds),
+          intendedRow("along a table, 20 mm above it", {1, 0, 0}, 0.02, Cloth::NONE, seeds),
+          intendedRow("laying a towel over an edge", test::PathLoop::LAYS, 0.06, Cloth::HANGS, seeds)};
 }
 
 int run(const std::string& out, std::size_t seeds, bool only_intended) {

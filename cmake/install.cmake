@@ -53,7 +53,7 @@ install(FILES ${TRUE_SOURCE_DIR}/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAG
 #catkin_lint: ignore_once missing_directory external_directory
 install(DIRECTORY ${TRUE_SOURCE_DIR}/fleet DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
   PATTERN analyze_fleet EXCLUDE PATTERN __pycache__ EXCLUDE)
-catkin_install_python(PROGRAMS examples/slow_the_arm.py examples/stop_the_arm.py examples/publish_cloth.py fleet/analyze_fleet src/apps/watch
+catkin_install_python(PROGRAMS examples/guard_twist.py examples/slow_the_arm.py examples/stop_the_arm.py examples/publish_cloth.py fleet/analyze_fleet src/apps/watch
   audit/audit_bag DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 # The parts of audit_bag lie beside it.
 install(FILES audit/came.py audit/owned.py audit/placed.py audit/touches.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

@@ -21,6 +21,12 @@ struct IntendedPath {
   struct Of {
     std::uint16_t body = 0;
     std::vector<Eigen::Isometry3d> pose;  ///< fixed_from_body at each of the times, as Body::pose_t1
+    /// If that is another body, rigid and on the path, the poses are the carrier's, and each vertex of this one leaves
+    /// the place at which it would be carried at relative_m_s at the most.
+    std::size_t carrier = SpeedBound::NO_CARRIER;
+    double relative_m_s = 0;
+    /// Whose frame the poses are of.
+    std::size_t frameOf() const { return carrier == SpeedBound::NO_CARRIER ? body : carrier; }
   };
   std::vector<double> time_s;  ///< ascending, from 0
   std::vector<Of> bodies;
@@ -31,8 +37,8 @@ struct IntendedPath {
 
   double endsAt() const { return time_s.empty() ? 0 : time_s.back(); }
   double tubeAt(double ahead_s) const { return deviation_m + deviation_rate_m_s * ahead_s; }
-  const Of* find(std::uint16_t body) const;  ///< null: it is not on it
-  std::size_t pieceAt(double at_s) const;    ///< that holds the time; the last one at the end
+  const Of* find(std::size_t body) const;  ///< null: it is not on it
+  std::size_t pieceAt(double at_s) const;  ///< that holds the time; the last one at the end
   double shareAt(std::size_t piece, double at_s) const;
 };
 
@@ -60,6 +66,9 @@ DCCD_EXPORT PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, 
 /// The rest of a path from a time on, for lasts_s [s] at the most; time_s begins with 0 again. Who is at from_s may
 /// already be as far as by_s: the way to there takes no time to speak of.
 DCCD_EXPORT IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double lasts_s);
+
+/// Where the vertices of a body that another one carries would be at the other step's end, if they were fixed to that.
+DCCD_EXPORT Positions carriedTo(const Step& from, const Step& to, std::size_t body, std::size_t carrier);
 
 /// The same way from where the step has the bodies.
 DCCD_EXPORT IntendedPath beginningAt(const IntendedPath& path, const Step& step);
@@ -95,8 +104,9 @@ struct FirstTouch {
 /// Until when, and how fast, on a path that begins where the step ends.
 ///
 /// What is assumed: each body of the path is carried from where the step has it along the path, at 0 to 1 times its
-/// pace, whichever, and each of its vertices is within tubeAt(t) of there t seconds after the step's end. Bodies that
-/// are not on it keep to their bounds, and all else is as for SafeUntil.
+/// pace, whichever, and each of its vertices is within tubeAt(t) of there t seconds after the step's end; of what a
+/// body of it carries by relative_m_s t more, which is part of the tubes below. Bodies that are not on it keep to their
+/// bounds, and all else is as for SafeUntil.
 ///
 /// Theorem (until). Let D(x) be the least distance of two partners, less their minimum separation and what the pieces
 /// bend by, while those on the path go from its begin to the time x and the others stay where the step has them, and
@@ -109,7 +119,7 @@ struct FirstTouch {
 /// Theorem (scale). At a scale s the bodies pass the path up to x = s T_r + s^2 T_s / 2 until they stand, W = T_r + s
 /// T_s after the step's end. If D(x) is at least the tubes at W + v_h W + v_r x + C (v_r of what slows down and is not
 /// on the path), the two do not touch before all stands, which leaves C. A pair may also be as fast as its bounds
-/// alone allow, or, the standing rule,
+/// alone allow, or, the standing rule, if all of it slows down,
 /// - if it comes no nearer on the path than where it begins, but for the tolerance of distances and bend_m; or
 /// - where it touches: if there is a plane that has all of the body in front of it, the body's least height over it at
 ///   no end of a piece up to x is less than at its begin, and what of the partner, which is not on the path, is not

@@ -25,6 +25,12 @@ struct SpeedBound {
   /// What a promise rests on is the less of the two. SpeedScale, which is what an arm may set off by, goes by max_m_s.
   double last_step_factor = 0;
   bool slows_down = true;  ///< SpeedScale slows it; false: it goes on as fast, whatever the scale
+  /// A rigid body of the step that carries this one, if that is another one than itself: no vertex leaves the place at
+  /// which it would be carried faster than relative_m_s. Against what the same body carries this counts where it is
+  /// less: distances are the same in its frame.
+  std::size_t carrier = NO_CARRIER;
+  double relative_m_s = NONE;
+  static constexpr std::size_t NO_CARRIER = std::numeric_limits<std::size_t>::max();
 };
 
 /// Nothing is promised beyond this much after a step's end [s].
@@ -40,7 +46,9 @@ constexpr double MOST_PROMISED_S = 10;
 /// its bound times the time, so neither does the point. Two points that are d apart need d / v to meet.
 /// It rests on this:
 /// - a vertex is where the step ends, or within its uncertainty radius of there (d is less by the radii);
-/// - no vertex is faster afterwards than its body's bound; a body against itself counts with twice its bound;
+/// - no vertex is faster afterwards than its body's bound; a body against itself counts with twice its bound; one that
+/// is
+///   carried leaves its carrier no faster than it may (v is then the sum of these, in the carrier's frame);
 /// - the surface stays straight between its vertices, and has the same edges and faces;
 /// - the map gets no voxel, and stays where it is. Bodies and features that the step leaves out are not spoken of, nor
 ///   are a body's own features that are neighbours (ClearanceOptions::self_m; where that is 0 all of them) or features

@@ -166,6 +166,11 @@ void readBodySpeed(ParameterReader& reader, const MonitorConfig& config, BodyCon
   }
   body.speed.slows_down = reader.get("slows_down", true);
   const bool straight = !is_static && !body.isRigid();
+  if (reader.has("carried_by") || reader.has("max_relative_speed_m_s")) {
+    if (!straight) reader.fail("carried_by", "is for what deforms: tf says how fast a rigid body or a static one is");
+    body.carried_by = reader.get("carried_by", std::string());
+    body.speed.relative_m_s = reader.number("max_relative_speed_m_s", 0, LARGE);
+  }
   if (!straight && reader.has("max_acceleration_m_s2") && config.bodies_listed) {
     reader.fail("max_acceleration_m_s2", std::string("has no meaning for a ") + (is_static ? "static" : "rigid") +
                                              " body, which does not go straight between two frames; remove it");

@@ -36,6 +36,8 @@ double separationOf(ParameterReader& reader, double fallback);
 void readSpeeds(ParameterReader& reader, MonitorConfig& config);
 /// max_speed_m_s of the section, or the fallback.
 SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback);
+/// Which body each frame of a carried_by carries. After the robot.
+void findCarriers(const ParameterReader& reader, MonitorConfig& config);
 /// Refuses a speed_scale that would be 0 for lack of any bound. After the robot.
 void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config);
 /// Two bodies that an entry names under `between`, or a body and OBSTACLE_BODY, or a body twice.

@@ -356,6 +356,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, con
   applyEffects(config);
   checkOwnVoxels(reader, config);
   settleAccuracy(reader, config);
+  findCarriers(reader, config);
   checkSpeeds(reader, config);
   config.given_hash = hashOf(givenText(tree) + config.robot.text);
   return config;

@@ -35,6 +35,7 @@ struct BodyConfig {
   std::string tf_frame;
   double mesh_scale = 1;
   SpeedBound speed;                               ///< after a step; of a static body 0
+  std::string carried_by;                         ///< the frame that does; empty: none is named
   double max_acceleration_m_s2 = 0;               ///< between two frames no vertex has more; 0: nobody says
   std::shared_ptr<const MeshResource> link_mesh;  ///< of a robot's link it is made already
   bool isRigid() const { return body.rigid; }
@@ -55,6 +56,11 @@ struct CloudSource {
 struct IntentConfig {
   double horizon_s = 0;  ///< how long a twist is held, and how far ahead a trajectory is looked at
   double deviation_m = 0, deviation_rate_m_s = 0;
+};
+
+/// The parameters under `limits`: of ~limits.
+struct LimitsConfig {
+  double max_m = 0, horizon_s = 0;
 };
 
 struct MarkerConfig {
@@ -94,6 +100,7 @@ struct MonitorConfig {
   double max_acceleration_m_s2 = 0;    ///< the same
   std::optional<SpeedLaw> speed_law;   ///< of ~speed_scale; none: nobody asks for it
   std::optional<IntentConfig> intent;  ///< of ~intended; none: nobody listens to it
+  std::optional<LimitsConfig> limits;  ///< of ~limits; none: it is off
   /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
   std::vector<Expectation> expected_contacts;
   std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from

@@ -25,6 +25,14 @@ IntentConfig readIntent(ParameterReader section) {
   return intent;
 }
 
+LimitsConfig readApproachLimits(ParameterReader section) {
+  LimitsConfig limits;
+  limits.max_m = section.number("max_m", 1e-3, LARGE);
+  limits.horizon_s = section.number("horizon_s", 1e-3, MOST_PROMISED_S);
+  section.finish();
+  return limits;
+}
+
 bool isBounded(const SpeedBound& speed) { return std::isfinite(speed.max_m_s) || speed.last_step_factor > 0; }
 
 /// Bodies that move by themselves, or with a link.
@@ -41,11 +49,28 @@ void readSpeeds(ParameterReader& reader, MonitorConfig& config) {
   config.max_acceleration_m_s2 = reader.number("max_acceleration_m_s2", 0.0, 0, LARGE);
   if (reader.has("speed_scale")) config.speed_law = readSpeedLaw(reader.neededSection("speed_scale"));
   if (reader.has("intent")) config.intent = readIntent(reader.neededSection("intent"));
+  if (reader.has("limits")) config.limits = readApproachLimits(reader.neededSection("limits"));
+}
+
+void findCarriers(const ParameterReader& reader, MonitorConfig& config) {
+  for (BodyConfig& body : config.bodies) {
+    if (!std::isfinite(body.speed.relative_m_s)) continue;
+    const auto carrier = std::find_if(config.bodies.begin(), config.bodies.end(), [&](const BodyConfig& other) {
+      return other.isRigid() && !body.carried_by.empty() && other.tf_frame == body.carried_by;
+    });
+    if (carrier == config.bodies.end()) {
+      reader.fail("bodies/" + body.body.name + "/carried_by",
+                  "is '" + body.carried_by + "', which carries no rigid body or link that is watched");
+    }
+    body.speed.carrier = static_cast<std::size_t>(carrier - config.bodies.begin());
+  }
 }
 
 void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config) {
-  if (config.intent && !config.promises()) {
-    reader.fail("intent",
+  if (config.limits && config.limits->max_m > config.monitor.detector.clearance.max_m)
+    reader.fail("limits/max_m", "is more than clearance/max_m, up to which distances are looked for");
+  if ((config.intent || config.limits) && !config.promises()) {
+    reader.fail(config.intent ? "intent" : "limits",
                 "needs distances and a speed bound: give max_speed_m_s, with effects/clearance not off, or remove it");
   }
   if (!config.speed_law) return;

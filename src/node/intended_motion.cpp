@@ -171,7 +171,7 @@ IntendedPath IntendedMotion::emptyPath(const std::vector<CarriedBody>& on_it) co
   IntendedPath path;
   path.deviation_m = limits_.deviation_m;
   path.deviation_rate_m_s = limits_.deviation_rate_m_s;
-  for (const CarriedBody& one : on_it) path.bodies.push_back({one.body, {}});
+  for (const CarriedBody& one : on_it) path.bodies.push_back({one.body, {}, one.carrier, one.relative_m_s});
   return path;
 }
 
@@ -187,18 +187,26 @@ std::optional<IntendedPath> IntendedMotion::from(const Step& step, const std::ve
   return motions_.front().isTwist() ? byTwists(step, carried, lookup) : alongTrajectory(step, carried, lookup);
 }
 
-std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
-                                                            const Lookup& lookup) {
-  Motion& motion = motions_.front();
+std::vector<CarriedBody> IntendedMotion::movedBy(const Motion& motion, const std::vector<CarriedBody>& carried) {
   std::vector<CarriedBody> on_it;
+  bool moves_one = false;
   for (const CarriedBody& one : carried) {
     if (!tree_->hasLink(one.frame)) continue;
     const std::set<std::string> joints = tree_->jointsTo(one.frame);
     const auto named = std::count_if(motion.joints.begin(), motion.joints.end(),
                                      [&](const std::string& name) { return joints.count(name) > 0; });
     if (named > 0 && joints.size() > static_cast<std::size_t>(named)) moved_by_others_ = one.frame;
-    if (named > 0 && joints.size() == static_cast<std::size_t>(named)) on_it.push_back(one);
+    if (joints.size() != static_cast<std::size_t>(named)) continue;
+    on_it.push_back(one);
+    moves_one = moves_one || named > 0;
   }
+  return moves_one ? on_it : std::vector<CarriedBody>();
+}
+
+std::optional<IntendedPath> IntendedMotion::alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
+                                                            const Lookup& lookup) {
+  Motion& motion = motions_.front();
+  const std::vector<CarriedBody> on_it = movedBy(motion, carried);
   const std::optional<Eigen::Isometry3d> base = lookup(tree_->root(), step.stamp_ns);
   if (on_it.empty() || !base) {
     drop(on_it.empty() ? "joint_names: they move no link that is watched, or not alone"
@@ -285,14 +293,14 @@ std::optional<IntendedPath> IntendedMotion::byTwists(const Step& step, const std
     drop("header/frame_id '" + frame + "' " + (begin ? "carries nothing that is watched" : "has no place"));
     return std::nullopt;
   }
+  IntendedPath path = emptyPath(on_it);
   double far_m = 0, reach_m = 0;
   std::vector<Eigen::Isometry3d> from_frame;
   for (const CarriedBody& one : on_it) {
-    from_frame.push_back(begin->inverse() * step.bodies[one.body].pose_t1);
+    from_frame.push_back(begin->inverse() * step.bodies[path.bodies[from_frame.size()].frameOf()].pose_t1);
     reach_m = std::max(reach_m, one.reach_m);
     far_m = std::max(far_m, from_frame.back().translation().norm() + one.reach_m);
   }
-  IntendedPath path = emptyPath(on_it);
   Eigen::Isometry3d at = *begin;
   for (std::size_t m = 0; m < motions_.size() && motions_[m].isTwist() && motions_[m].frame == frame; ++m) {
     const Motion& motion = motions_[m];

@@ -18,12 +18,15 @@
 
 namespace dccd {
 
-/// A body that a frame carries: its vertices are within reach_m of its own frame's origin.
+/// A body that a frame carries, or what one of these carries (IntendedPath::Of): its vertices are within reach_m of the
+/// origin of that body's own frame.
 struct CarriedBody {
   std::uint16_t body = 0;
   std::string frame;
   Eigen::Isometry3d frame_from_body = Eigen::Isometry3d::Identity();
   double reach_m = 0;
+  std::size_t carrier = SpeedBound::NO_CARRIER;
+  double relative_m_s = 0;
 };
 
 /// The newest message counts, until its end, or until the robot is found off it; before it begins the one before. One
@@ -82,6 +85,8 @@ class IntendedMotion {
 
   std::string add(Motion motion, std::string problem, StampNs newest_ns);
   std::string segmentsOf(const trajectory_msgs::JointTrajectory& message, Motion& motion) const;
+  /// What its joints alone move, and what no joint does, which stands still; none: they move nothing alone.
+  std::vector<CarriedBody> movedBy(const Motion& motion, const std::vector<CarriedBody>& carried);
   std::optional<IntendedPath> alongTrajectory(const Step& step, const std::vector<CarriedBody>& carried,
                                               const Lookup& lookup);
   std::optional<IntendedPath> byTwists(const Step& step, const std::vector<CarriedBody>& carried, const Lookup& lookup);

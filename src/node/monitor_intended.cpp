@@ -9,7 +9,7 @@
 
 namespace dccd {
 
-std::vector<CarriedBody> MonitorPipeline::carriedBodies() const {
+std::vector<CarriedBody> MonitorPipeline::carriedBodies(const Step& step) const {
   std::vector<CarriedBody> carried;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b] || rigid_[b]->isNone() || rigid_[b]->frame == fixed_frame_ || rigid_[b]->let_go_ns != Rigid::NEVER)
@@ -19,6 +19,20 @@ std::vector<CarriedBody> MonitorPipeline::carriedBodies() const {
     one.frame = rigid_[b]->frame;
     one.frame_from_body = rigid_[b]->frame_from_mesh;
     for (const Vec3& p : rigid_[b]->reference) one.reach_m = std::max(one.reach_m, p.norm());
+  }
+  const std::vector<SpeedBound> bounds = speedBounds();
+  for (std::size_t b = 0, rigid = carried.size(); b < step.bodies.size() && b < bounds.size(); ++b) {
+    for (std::size_t c = 0; c < rigid; ++c) {
+      if (carried[c].body != bounds[b].carrier) continue;
+      CarriedBody one = carried[c];
+      one.body = static_cast<std::uint16_t>(b);
+      one.carrier = bounds[b].carrier;
+      one.relative_m_s = bounds[b].relative_m_s;
+      one.reach_m = 0;
+      for (const Vec3& p : *step.bodies[b].t1)
+        one.reach_m = std::max(one.reach_m, (step.bodies[one.carrier].pose_t1.inverse() * p).norm());
+      carried.push_back(one);
+    }
   }
   return carried;
 }
@@ -39,6 +53,13 @@ AlongPath MonitorPipeline::searchAlong(const IntendedPath& path, FirstTouch* fir
   return path_search_.run(*answered_, options, speedBounds(), config_.speed_law, path, deadline, first);
 }
 
+ApproachLimits MonitorPipeline::limitsAfter(const Outcome& outcome) {
+  const Options& options = monitor_->options().detector;
+  const Deadline deadline = Deadline::after(tolerance::LOOK_AHEAD_SHARE * timeLimitMs(options));
+  return approach_search_.run(outcome, options, speedBounds(), config_.limits->max_m, config_.limits->horizon_s,
+                              deadline);
+}
+
 /// Whatever it throws, what the bounds alone allow stands.
 void MonitorPipeline::followIntended() {
   const Step& step = *answered_->step;
@@ -47,11 +68,16 @@ void MonitorPipeline::followIntended() {
   intended_.along.unused = "no path is in force";
   std::function<std::string(const Outcome&)> why_void;  // as the next answer tells
   try {
-    if (const std::optional<IntendedPath> path = motion_->from(step, carriedBodies(), places())) {
+    if (const std::optional<IntendedPath> path = motion_->from(step, carriedBodies(step), places())) {
       Intended found{*path, searchAlong(*path)};
-      why_void = [path = beginningAt(*path, step), stamp_ns = answered_->stamp_ns](const Outcome& next) {
-        const double ahead_s = secondsBetween(stamp_ns, next.stamp_ns);
-        const PlaceOnPath place = placeOnPath(path, *next.step, 0, ahead_s);
+      why_void = [path = beginningAt(*path, step), before = answered_->step](const Outcome& next) {
+        const double ahead_s = secondsBetween(before->stamp_ns, next.stamp_ns);
+        Step now = *next.step;
+        for (const IntendedPath::Of& of :
+             path.bodies)  // how far what is carried has left its place PromiseWatch looks at
+          if (of.frameOf() != of.body && std::max<std::size_t>(of.body, of.carrier) < now.bodies.size())
+            now.bodies[of.body].t1 = share(carriedTo(*before, now, of.body, of.carrier));
+        const PlaceOnPath place = placeOnPath(path, now, 0, ahead_s);
         if (place.off_m <= path.tubeAt(ahead_s)) return std::string();
         std::ostringstream text;
         text << "the robot was " << place.off_m << " m off the intended path, and " << path.tubeAt(ahead_s)
@@ -84,7 +110,8 @@ deformable_ccd::WouldTouch::Response MonitorPipeline::wouldTouch(const trajector
   if (!unproved.empty()) return notProved(unproved);
   if (!answered_ || !statement_.assurance.proved) return notProved("the newest step is not proved");
   std::string problem;
-  const IntendedPath path = motion_->asked(trajectory, *answered_->step, carriedBodies(), places(), problem);
+  const IntendedPath path =
+      motion_->asked(trajectory, *answered_->step, carriedBodies(*answered_->step), places(), problem);
   FirstTouch first;
   if (problem.empty()) problem = searchAlong(path, &first).unused;
   auto answer = notProved(problem);

@@ -15,6 +15,7 @@
 #include <deformable_ccd/WouldTouch.h>
 
 #include "config/monitor_config.h"
+#include "dccd/approach_limits.h"
 #include "dccd/known_space.h"
 #include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
@@ -148,6 +149,8 @@ class MonitorPipeline {
   std::string takeIntendedProblem() { return motion_ ? motion_->takeProblem() : std::string(); }
   /// How fast what slows down may go after this outcome, the last one.
   SpeedScale speedScale(const Outcome& outcome) const;
+  /// Of this outcome, the last one; only with `limits`.
+  ApproachLimits limitsAfter(const Outcome& outcome);
   /// What may be said of the last outcome.
   const Statement& statement() const { return statement_; }
   /// How fast bodies are assumed to be, by body. A rigid one in the fixed frame stands still.
@@ -195,6 +198,7 @@ class MonitorPipeline {
   PromiseWatch promises_;
   std::optional<IntendedMotion> motion_;
   PathSearch path_search_;
+  ApproachSearch approach_search_;
   Intended intended_;
   std::optional<Outcome> answered_;  // the newest answer, where somebody listens to what is intended
   bool intends_anew_ = false;        // since then
@@ -260,7 +264,7 @@ class MonitorPipeline {
   void followIntended();
   AlongPath searchAlong(const IntendedPath& path, FirstTouch* first = nullptr);
   IntendedMotion::Lookup places();
-  std::vector<CarriedBody> carriedBodies() const;
+  std::vector<CarriedBody> carriedBodies(const Step& step) const;
   void loadFiles();
   /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.
   void doubtMap(const Outcome& outcome);

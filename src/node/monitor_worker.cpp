@@ -190,7 +190,7 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) try {
   if (!publish) publish = outputs.makeResult(outcome, bodies, frame);
   publish();
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
-  outputs.publishMarkers(outcome, bodies, config.markers, frame);
+  outputs.publishMarkers(outcome, bodies, config.markers, frame, pipeline.intended().path);
   publishEffects(toRosTime(outcome.stamp_ns));
   predict(outcome);
   if (outputs.wantsStats()) {
@@ -224,6 +224,13 @@ void CollisionMonitor::Impl::publishAhead(const Outcome& outcome) {
         toSafeUntil(outcome, pipeline.promises(), pipeline.speedBounds(), ros::Time::now(), frame);
     if (along.rests_on_path) promise.assumed.push_back(assumedOf(outcome, path));
     outputs.publishSafeUntil(promise);
+  }
+  if (config.limits) {
+    outputs.publishLimits([&] {
+      if (outcome.answered && !pipeline.statement().assurance.proved)  // or its promises are void
+        return toLimits(outcome, {{}, {}, config.limits->horizon_s, 0, {"the step is not proved"}}, {}, frame);
+      return toLimits(outcome, pipeline.limitsAfter(outcome), pipeline.speedBounds(), frame);
+    });
   }
   if (!config.intent) return;
   outputs.publishAlongPath(toAlongPath(outcome, path, along, frame));

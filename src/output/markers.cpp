@@ -228,6 +228,22 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
   return std::move(drawing.array);
 }
 
+void addPath(const Outcome& outcome, const IntendedPath& path, const std::string& frame, MarkerArray& array) {
+  if (!outcome.answered) return;
+  const MarkerDrawing drawing{outcome, outcome.step->bodies, {}, frame, {}};
+  for (const IntendedPath::Of& of : path.bodies) {
+    Marker tube = drawing.make("intended", Marker::LINE_STRIP, std::max(0.002, 2 * path.tubeAt(path.endsAt())));
+    tube.id = of.body;
+    tube.color = PREDICTED;
+    tube.color.a = 0.3f;
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : *outcome.step->bodies[of.body].t1) box.extend(p);
+    const Vec3 middle = outcome.step->bodies[of.frameOf()].pose_t1.inverse() * box.center();
+    for (const Eigen::Isometry3d& pose : of.pose) tube.points.push_back(point(pose * middle));
+    if (tube.points.size() > 1) array.markers.push_back(std::move(tube));
+  }
+}
+
 MarkerArray toPredictedMarkers(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                const MarkerConfig& config, const std::string& frame) {
   MarkerDrawing drawing{prediction, bodies, config, frame, {}};

@@ -6,6 +6,7 @@
 #include "output/output_messages.h"
 
 #include "config/monitor_config.h"
+#include "dccd/intended.h"
 
 namespace dccd {
 
@@ -15,6 +16,10 @@ namespace dccd {
 /// their names.
 visualization_msgs::MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies,
                                           const MarkerConfig& config, const std::string& frame);
+
+/// Beside these: where the middle of each body on the path goes, as thick as its tube at the end.
+void addPath(const Outcome& outcome, const IntendedPath& path, const std::string& frame,
+             visualization_msgs::MarkerArray& array);
 
 /// To be shown beside those of the step that it begins after.
 visualization_msgs::MarkerArray toPredictedMarkers(const Outcome& prediction, double horizon_s,

@@ -33,6 +33,7 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   }
   if (config.promises()) safe_until_ = node.advertise<deformable_ccd::SafeUntil>("safe_until", TOPIC_QUEUE, true);
   if (config.intent) along_path_ = node.advertise<deformable_ccd::AlongPath>("along_path", TOPIC_QUEUE);
+  if (config.limits) limits_ = node.advertise<deformable_ccd::Limits>("limits", TOPIC_QUEUE);
 }
 
 std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vector<Body>& bodies,
@@ -61,9 +62,11 @@ std::function<void()> Outputs::makeResult(const Outcome& outcome, const std::vec
 }
 
 void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
-                             const std::string& frame) {
+                             const std::string& frame, const IntendedPath& path) {
   if (markers_.getNumSubscribers() == 0 || frame.empty()) return;
-  markers_.publish(toMarkers(outcome, bodies, markers, frame));
+  visualization_msgs::MarkerArray array = toMarkers(outcome, bodies, markers, frame);
+  addPath(outcome, path, frame, array);
+  markers_.publish(array);
 }
 
 void Outputs::publishStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
@@ -93,6 +96,9 @@ void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, con
 
 void Outputs::publishSafeUntil(const deformable_ccd::SafeUntil& message) { safe_until_.publish(message); }
 
+void Outputs::publishLimits(const std::function<deformable_ccd::Limits()>& make) {
+  if (limits_ && limits_.getNumSubscribers() > 0) limits_.publish(make());
+}
 void Outputs::publishAlongPath(const deformable_ccd::AlongPath& message) { along_path_.publish(message); }
 
 void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }

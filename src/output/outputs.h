@@ -26,7 +26,7 @@ class Outputs {
   /// call of what is returned publishes them, once, before another list is made.
   std::function<void()> makeResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
   void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
-                      const std::string& frame);
+                      const std::string& frame, const IntendedPath& path);
   /// After the step's prediction, which it tells of.
   void publishStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
   /// Whether anybody listens to statistics.
@@ -42,6 +42,8 @@ class Outputs {
   void publishSafeUntil(const deformable_ccd::SafeUntil& message);
   /// Only where paths are listened to.
   void publishAlongPath(const deformable_ccd::AlongPath& message);
+  /// Built only if somebody listens, and where it is asked for.
+  void publishLimits(const std::function<deformable_ccd::Limits()>& make);
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.
   /// Nothing is shown any more: after a reset or when disabled. An empty frame: nothing was shown yet.
@@ -49,7 +51,7 @@ class Outputs {
 
  private:
   ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, predicted_, time_to_contact_, patches_, events_,
-      clearance_, safe_until_, along_path_;
+      clearance_, safe_until_, along_path_, limits_;
   deformable_ccd::ContactArray list_;  // each is made in the memory of the one before
 };
 

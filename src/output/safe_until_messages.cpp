@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <tuple>
 
 #include "output/output_messages.h"
 
@@ -15,8 +16,11 @@ void fillPair(const Outcome& outcome, std::size_t limiting, Message& out) {
 }
 
 /// What is assumed of one body's speed.
-std::string assumedOf(const Body& body, const SpeedBound& bound) {
+std::string assumedOf(const std::vector<Body>& bodies, const Body& body, const SpeedBound& bound) {
   std::ostringstream text;
+  if (bound.carrier < bodies.size())
+    text << "no vertex of '" << body.name << "' leaves where '" << bodies[bound.carrier].name
+         << "' carries it faster than " << bound.relative_m_s << " m/s, and ";
   if (bound.last_step_factor > 0) {
     text << "no vertex of '" << body.name << "' is faster than " << bound.last_step_factor
          << " times its fastest in this step";
@@ -44,7 +48,7 @@ std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<S
   if (!outcome.answered) return sentences;
   const std::vector<Body>& bodies = outcome.step->bodies;
   for (std::size_t b = 0; b < bodies.size() && b < bounds.size(); ++b) {
-    if (bodies[b].topology->vertexCount() > 0) sentences.push_back(assumedOf(bodies[b], bounds[b]));
+    if (bodies[b].topology->vertexCount() > 0) sentences.push_back(assumedOf(bodies, bodies[b], bounds[b]));
   }
   sentences.push_back(outcome.obstacle
                           ? "all that can be touched is in the map, which stands still and gets no new voxel"
@@ -111,12 +115,48 @@ deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath
   return out;
 }
 
+deformable_ccd::Limits toLimits(const Outcome& outcome, const ApproachLimits& limits,
+                                const std::vector<SpeedBound>& bounds, const std::string& frame) {
+  deformable_ccd::Limits out;
+  out.header = headerOf(outcome.stamp_ns, frame);
+  out.horizon = limits.horizon_s;
+  out.most_speed = limits.most_speed_m_s;
+  out.unknown = limits.unknown;
+  out.assumed = assumptions(outcome, bounds);
+  const auto point = [](const Vec3& p) {
+    geometry_msgs::Point at;
+    std::tie(at.x, at.y, at.z) = std::tie(p.x(), p.y(), p.z());
+    return at;
+  };
+  for (const std::uint16_t number : limits.bodies) {
+    const Body& body = outcome.step->bodies[number];
+    out.links.push_back(body.name);
+    out.origins.push_back(point(body.pose_t1.translation()));
+    double reach_m = 0;
+    for (const Vec3& p : *body.t1) reach_m = std::max(reach_m, (p - body.pose_t1.translation()).norm());
+    out.reaches.push_back(reach_m);
+  }
+  for (const ApproachLimit& limit : limits.of) {
+    const auto link = std::find(limits.bodies.begin(), limits.bodies.end(), limit.body);
+    out.link.push_back(static_cast<std::uint32_t>(link - limits.bodies.begin()));
+    out.partners.push_back(limit.partner == OBSTACLE_BODY ? "octomap" : outcome.step->bodies[limit.partner].name);
+    for (const Vec3& corner : limit.corner) out.corners.push_back(point(corner));
+    geometry_msgs::Vector3& normal = out.normals.emplace_back();
+    std::tie(normal.x, normal.y, normal.z) = std::tie(limit.normal.x(), limit.normal.y(), limit.normal.z());
+    out.speeds.push_back(limit.speed_m_s);
+  }
+  return out;
+}
+
 std::string assumedOf(const Outcome& outcome, const IntendedPath& path) {
   std::ostringstream text;
   for (const IntendedPath::Of& of : path.bodies)
     text << (text.tellp() > 0 ? ", '" : "'") << outcome.step->bodies[of.body].name << "'";
   text << " go along the intended path, at no more than its pace, within " << path.deviation_m << " m and "
        << path.deviation_rate_m_s << " m/s";
+  for (const IntendedPath::Of& of : path.bodies)
+    if (of.frameOf() != of.body)
+      text << ", and '" << outcome.step->bodies[of.body].name << "' " << of.relative_m_s << " m/s more";
   return text.str();
 }
 

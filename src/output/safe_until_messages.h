@@ -5,9 +5,11 @@
 #include <vector>
 
 #include <deformable_ccd/AlongPath.h>
+#include <deformable_ccd/Limits.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
 
+#include "dccd/approach_limits.h"
 #include "dccd/intended.h"
 #include "dccd/monitor_extras.h"
 
@@ -24,6 +26,8 @@ deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const SpeedScale
 /// What a path says of a step.
 deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath& path, const AlongPath& along,
                                       const std::string& frame);
+deformable_ccd::Limits toLimits(const Outcome& outcome, const ApproachLimits& limits,
+                                const std::vector<SpeedBound>& bounds, const std::string& frame);
 /// What a promise rests on, a sentence each; that it rests on a path, too.
 std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<SpeedBound>& bounds);
 std::string assumedOf(const Outcome& outcome, const IntendedPath& path);

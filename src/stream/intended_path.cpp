@@ -20,7 +20,7 @@ bool isAllFinite(const Body& body) {
 
 }  // namespace
 
-const IntendedPath::Of* IntendedPath::find(std::uint16_t body) const {
+const IntendedPath::Of* IntendedPath::find(std::size_t body) const {
   const auto found = std::find_if(bodies.begin(), bodies.end(), [&](const Of& of) { return of.body == body; });
   return found == bodies.end() ? nullptr : &*found;
 }
@@ -56,6 +56,8 @@ std::string problemOf(const IntendedPath& path, const std::vector<Body>& bodies)
     if (of.pose.size() != times || !std::all_of(of.pose.begin(), of.pose.end(), isPose))
       return "it has not a pose of '" + body.name + "' for each time";
     if (!isAllFinite(body)) return "nobody knows where '" + body.name + "' is";
+    if (of.frameOf() != of.body && (!path.find(of.carrier) || !isLength(of.relative_m_s)))
+      return "nobody knows how '" + body.name + "' is carried";
   }
   return "";
 }
@@ -116,7 +118,7 @@ PlaceOnPath placeOnPath(const IntendedPath& path, const Step& step, double from_
     Eigen::AlignedBox3d box;
     for (const Vec3& p : *body.t1) box.extend(p);
     now.push_back(cornersOf(box));
-    for (Vec3& p : local.emplace_back(now.back())) p = body.pose_t1.inverse() * p;
+    for (Vec3& p : local.emplace_back(now.back())) p = step.bodies[of.frameOf()].pose_t1.inverse() * p;
   }
   bool is_found = false, is_left = false;  // a stretch that is near enough
   for (std::size_t k = path.pieceAt(from_s); k + 1 < path.time_s.size(); ++k) {
@@ -188,12 +190,19 @@ IntendedPath restOf(const IntendedPath& path, double from_s, double by_s, double
   return rest;
 }
 
+Positions carriedTo(const Step& from, const Step& to, std::size_t body, std::size_t carrier) {
+  const Eigen::Isometry3d moved = to.bodies[carrier].pose_t1 * from.bodies[carrier].pose_t1.inverse();
+  Positions places;
+  for (const Vec3& p : *from.bodies[body].t1) places.push_back(moved * p);
+  return places;
+}
+
 IntendedPath beginningAt(const IntendedPath& path, const Step& step) {
   IntendedPath moved = path;
   for (IntendedPath::Of& of : moved.bodies) {
-    const Eigen::Isometry3d begin = of.pose[0].inverse() * step.bodies[of.body].pose_t1;
+    const Eigen::Isometry3d begin = of.pose[0].inverse() * step.bodies[of.frameOf()].pose_t1;
     for (Eigen::Isometry3d& pose : of.pose) pose = pose * begin;
-    of.pose[0] = step.bodies[of.body].pose_t1;
+    of.pose[0] = step.bodies[of.frameOf()].pose_t1;
   }
   return moved;
 }

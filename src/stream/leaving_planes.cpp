@@ -86,7 +86,7 @@ class LeavingPlanes {
     whole.waypoints.clear();
     whole.turns = true;
     whole.t0 = whole.t1;
-    whole.pose_t0 = whole.pose_t1;
+    whole.pose_t0 = whole.pose_t1 = outcome_.step->bodies[of.frameOf()].pose_t1;
     Body part = whole;  // on one of the pieces
     const auto go = [&](const Eigen::Isometry3d& pose) {
       part.t0 = std::exchange(part.t1, placesAt(whole, {0, pose, nullptr}));

@@ -45,6 +45,8 @@ std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<Speed
     };
     require(bounds[b].max_m_s, "max_m_s");
     require(bounds[b].last_step_factor, "last_step_factor");
+    require(bounds[b].relative_m_s, "relative_m_s");
+    if (bounds[b].carrier >= bounds.size()) bounds[b].carrier = SpeedBound::NO_CARRIER;  // it is not there
     const Body& body = outcome.step->bodies[b];
     if (body.motion == BodyMotionKind::STATIC && body.turns) bounds[b] = {};  // its frame takes it along
   }
@@ -91,19 +93,31 @@ double distanceOf(const Outcome& outcome, const Insides& insides, const Clearanc
 }
 
 Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
-  Speeds speeds;
-  for (const std::uint16_t body : pair.body) {
-    if (body == OBSTACLE_BODY) {
-      if (outcome.step->map.way.empty()) continue;  // it stays
-      speeds.unbounded = "octomap";
-      speeds.other = SpeedBound::NONE;
-      continue;
+  const auto sumOf = [&](const auto& boundOf) {
+    Speeds speeds;
+    for (const std::uint16_t body : pair.body) {
+      if (body == OBSTACLE_BODY) {
+        if (outcome.step->map.way.empty()) continue;  // it stays
+        speeds.unbounded = "octomap";
+        speeds.other = SpeedBound::NONE;
+        continue;
+      }
+      const double bound = boundOf(body);
+      double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
+      if (!std::isfinite(bound)) speeds.unbounded = outcome.step->bodies[body].name;
+      sum = sum == 0 ? bound : roundedUp(sum + bound);
+      speeds.slows = speeds.slows || (bounds[body].slows_down && bounds[body].max_m_s > 0);
     }
-    double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
-    if (!std::isfinite(bounds[body].max_m_s)) speeds.unbounded = outcome.step->bodies[body].name;
-    sum = sum == 0 ? bounds[body].max_m_s : roundedUp(sum + bounds[body].max_m_s);
-  }
-  return speeds;
+    return speeds;
+  };
+  const auto isCarried = [&](std::uint16_t body) { return bounds[body].carrier != SpeedBound::NO_CARRIER; };
+  const auto frameOf = [&](std::uint16_t body) { return isCarried(body) ? bounds[body].carrier : body; };
+  const Speeds speeds = sumOf([&](std::uint16_t body) { return bounds[body].max_m_s; });
+  const bool by_one =
+      !isItself(pair) && pair.body[1] != OBSTACLE_BODY && frameOf(pair.body[0]) == frameOf(pair.body[1]);
+  if (!by_one) return speeds;
+  const Speeds relative = sumOf([&](std::uint16_t body) { return isCarried(body) ? bounds[body].relative_m_s : 0; });
+  return relative.closing() <= speeds.closing() ? relative : speeds;
 }
 
 std::string unboundedReason(const std::string& body) { return "no speed bound is known of body '" + body + "'"; }

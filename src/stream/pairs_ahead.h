@@ -91,9 +91,10 @@ double separationOf(const Outcome& outcome, const Clearance& pair);
 /// What is certainly between the two at the step's end until they touch [m]; 0: nothing, or nobody knows.
 double distanceOf(const Outcome& outcome, const Insides& insides, const Clearance& pair);
 
-/// Of both partners [m/s]; the map stands still.
+/// Of both partners [m/s], or of both in the frame of what carries the two, whichever is less; the map stands still.
 struct Speeds {
-  double slowed = 0, other = 0;  // slowed 0: nothing of the two slows down
+  double slowed = 0, other = 0;  // of what slows down, and of what does not
+  bool slows = false;            // something of the two slows down
   std::string unbounded;         // a body of which nobody says how fast it is
   /// Of both together, rounded up.
   double closing() const { return slowed > 0 && other > 0 ? roundedUp(slowed + other) : slowed + other; }

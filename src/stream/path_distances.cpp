@@ -6,6 +6,7 @@
 
 #include "dccd/mesh_store.h"
 #include "step/parts.h"
+#include "stream/body_trees.h"
 #include "stream/radii.h"
 
 namespace dccd {
@@ -45,21 +46,15 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
   Shape& one = shapes_[number];
   if (one.is_known) return one;
   const Body& body = outcome_->step->bodies[number];
-  Body& setup = one.setup.setup;
-  if (setup.topology != body.topology || setup.vertex_mask != body.vertex_mask) {
-    one = Shape();
-    setup.topology = body.topology;
-    setup.vertex_mask = body.vertex_mask;
-    one.setup.slot_vertex.assign(body.topology->usedVertices().begin(), body.topology->usedVertices().end());
-    if (!body.vertex_mask.empty()) one.setup.asked.assign(body.topology->vertexCount(), 1);
-    for (const Index v : body.vertex_mask) one.setup.asked[v] = 0;
+  if (takesMesh(body, one.setup)) {
     one.moving.build(one.setup, *body.t1);
     one.still = one.moving;
   }
   one.is_known = true;
   const IntendedPath::Of* const of = path_->find(number);
   one.pose = of ? &of->pose : nullptr;
-  const Eigen::Isometry3d to_local = one.pose ? body.pose_t1.inverse() : Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d to_local =
+      of ? outcome_->step->bodies[of->frameOf()].pose_t1.inverse() : Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3d box(Vec3::Zero());
   box.setEmpty();
   one.local.clear();
@@ -69,7 +64,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
     const bool is_asked = one.setup.asked.empty() || one.setup.asked[v];
     const Vec3 p = is_asked ? Vec3(to_local * (*body.t1)[v]) : Vec3(Vec3::Zero());
     one.local.push_back(p);
-    one.rest.push_back({{p[0], p[1], p[2], 0}, {p[0], p[1], p[2], 0}});
+    one.rest.push_back(atRestAt(p));
     if (is_asked) box.extend(p);
     one.reach_m = std::max(one.reach_m, p.norm());
   }
@@ -182,7 +177,7 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
   return off_m * ABOVE + arcOf(way, stretch);
 }
 
-double PathDistances::over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m) {
+double PathDistances::over(Way& way, const Stretch& stretch, double enough_m, double tolerance_m, bool only_whether) {
   const bool with_map = way.still == OBSTACLE_BODY;
   found_ = {};
   if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;
@@ -192,16 +187,19 @@ double PathDistances::over(const Way& way, const Stretch& stretch, double enough
   ++questions_;
   const double taken_m =
       place(way, stretch) + shapes_[way.mover].radius_m + (with_map ? 0 : shapes_[way.still].radius_m);
-  const NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_, nullptr};
+  NearestSearch::Goal goal{tolerance_m, (enough_m + taken_m) * ABOVE, false, deadline_};
+  if (way.near) goal.near = &*way.near;
+  if (only_whether) goal.gives_up_m = enough_m + taken_m;
   const auto never = [](std::uint32_t, std::uint32_t) { return true; };  // is asked of what is at the end alone
   const NearestSearch::AllPairs all;
   found_ = with_map ? search_.run(tree, map_, all, goal, {}, never)
                     : search_.run(tree, shapes_[way.still].still, all, goal, {}, never);
+  if (std::isfinite(found_.upper_m)) way.near = found_.item;
   const double rest_m = found_.lower_m - taken_m - (ABOVE - 1) * found_.lower_m;
   return rest_m > 0 ? rest_m : 0;
 }
 
-Vec3 PathDistances::nearest(const Way& way, double time_s) {
+Vec3 PathDistances::nearest(Way& way, double time_s) {
   over(way, {time_s, time_s}, LARGEST_M, 1e-6);
   if (!std::isfinite(found_.upper_m)) return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   const Vec3 between = (found_.point[0] + found_.point[1]) / 2;

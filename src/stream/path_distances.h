@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dccd/intended.h"
@@ -28,6 +29,7 @@ class DCCD_HIDDEN PathDistances {
     std::vector<double> gone_m;           // by chords, at each time
     double bends = 0;                     // how many of the two are on the path
     double rounding_m = 0;
+    std::optional<std::array<std::uint32_t, 2>> near;  // items that were the nearest
   };
 
   /// `path`: from where the outcome's step has the bodies. Both must live until the last question.
@@ -37,10 +39,10 @@ class DCCD_HIDDEN PathDistances {
 
   /// A lower bound of the two surfaces' distance over the stretch, less their radii and by how much the path's pieces
   /// leave the straight ways through it [m]. Within the tolerance, but for these, of what is true where that is below
-  /// enough_m. 0: nobody knows.
-  double over(const Way& way, const Stretch& stretch, double enough_m, double tolerance_m);
+  /// enough_m, unless only that matters. 0: nobody knows.
+  double over(Way& way, const Stretch& stretch, double enough_m, double tolerance_m, bool only_whether = false);
   /// Where the two are nearest at a time, between them, in the fixed frame; NaN: nobody knows.
-  Vec3 nearest(const Way& way, double time_s);
+  Vec3 nearest(Way& way, double time_s);
   /// How far any vertex of the mover comes from where it is when the stretch begins, at most [m].
   double goneBy(const Way& way, const Stretch& stretch) const;
   /// What over() takes off for turns within the pieces of the stretch [m].

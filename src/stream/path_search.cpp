@@ -64,7 +64,7 @@ class Search {
     FirstTouch first;
     first.free_s = farthest(Goal::UNTIL, path_.endsAt());
     if (!failing_) return first;
-    const PathPair& pair = pairs_[*failing_];
+    PathPair& pair = pairs_[*failing_];
     first.body = pair.body;
     first.point = distances_.nearest(pair.way, first.free_s);
     if (pair.start_m == 0 && !pair.touches) {
@@ -91,19 +91,21 @@ class Search {
       const Speeds by_bounds = speedsOf(outcome_, row, after_), at_full = speedsOf(outcome_, row, full_);
       if (by_bounds.unbounded.empty() && pair.start_m > 0) pair.apart_s = secondsTo(pair.start_m, by_bounds.closing());
       double allowed = 1;
-      if (law_ && !isItself(row) && at_full.slowed > 0) {
+      if (law_ && !isItself(row) && at_full.slows) {
         const bool is_known = at_full.unbounded.empty() && pair.start_m > 0;
         allowed = is_known ? dccd::speedScale(pair.start_m, at_full.slowed, at_full.other, *law_) : 0;
       }
-      bool slows = true;
+      bool slows = true, swings_on = false;  // what is on the path; what it carries, when all stands
       for (const std::uint16_t body : row.body) {
         if (body == OBSTACLE_BODY) {
           if (!outcome_.step->map.way.empty()) pair.other_m_s = pair.closing_m_s = SpeedBound::NONE;
           continue;
         }
-        if (path_.find(body)) {
+        if (const IntendedPath::Of* const of = path_.find(body)) {
           ++pair.on_path;
-          slows = slows && full_[body].slows_down;
+          pair.rate_m_s += of->relative_m_s;
+          slows = slows && full_[of->frameOf()].slows_down;
+          swings_on = swings_on || !full_[body].slows_down;
         } else {
           (full_[body].slows_down ? pair.slowed_m_s : pair.other_m_s) = full_[body].max_m_s;
           pair.closing_m_s = after_[body].max_m_s;
@@ -119,10 +121,11 @@ class Search {
       pair.touches = row.at_end.status == ClearanceStatus::TOUCHING;
       pair.most_m = std::max(pair.start_m, row.at_end.upper_m);
       pair.deviation_m = static_cast<double>(pair.on_path) * path_.deviation_m;
-      pair.rate_m_s = static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
+      pair.rate_m_s += static_cast<double>(pair.on_path) * path_.deviation_rate_m_s;
       pair.allowed_s = allowed >= 1 ? SpeedBound::NONE : law_ ? PathPace{*law_}.timeOf(allowed) : 0;
       pair.may_scale = slows && std::isfinite(pair.slowed_m_s) && std::isfinite(pair.other_m_s);
-      pair.may_stand = pair.may_scale && pair.other_m_s == 0 && row.at_end.status != ClearanceStatus::UNKNOWN;
+      pair.may_stand =
+          pair.may_scale && pair.other_m_s == 0 && !swings_on && row.at_end.status != ClearanceStatus::UNKNOWN;
       pair.way = distances_.wayOf(pair.body);
       pairs_.push_back(std::move(pair));
     });
@@ -141,8 +144,9 @@ class Search {
   }
 
   /// What is between the two at least over the stretch, but for bends: by what was asked before, where that is enough,
-  /// or asked now.
-  double distanceOver(PathPair& pair, const Stretch& stretch, double enough_m, double tolerance_m) {
+  /// or asked now: of less than that any bound, if only that matters.
+  double distanceOver(PathPair& pair, const Stretch& stretch, double enough_m, double tolerance_m,
+                      bool only_whether = false) {
     double least_m = pair.start_m - distances_.goneBy(pair.way, {0, stretch.to_s});
     for (const PathPair::Asked& one : pair.asked) {
       if (one.of.from_s == stretch.from_s && one.of.to_s == stretch.to_s && one.enough_m >= enough_m &&
@@ -156,8 +160,10 @@ class Search {
     }
     if (least_m >= enough_m || !mayGoOn(pair)) return std::max(0.0, least_m);
     const double asked_m = enough_m + pair.separation_m;
-    const double found_m = (distances_.over(pair.way, stretch, asked_m, tolerance_m) - pair.separation_m) * (1 - 1e-12);
-    pair.asked.push_back({stretch, enough_m, tolerance_m, std::max({0.0, least_m, found_m})});
+    const double found_m =
+        (distances_.over(pair.way, stretch, asked_m, tolerance_m, only_whether) - pair.separation_m) * (1 - 1e-12);
+    const double of_m = only_whether && found_m < enough_m ? 0 : enough_m;  // another time it may matter
+    pair.asked.push_back({stretch, of_m, tolerance_m, std::max({0.0, least_m, found_m})});
     return pair.asked.back().least_m;
   }
 
@@ -186,7 +192,7 @@ class Search {
     const auto holds = [&](const Stretch& stretch) {
       // What arcs take off is given back: their ends are on the straight ways, which come no nearer.
       const double held_m = least_m - distances_.arcOf(pair.way, stretch);
-      return held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_) >= held_m;
+      return held_m > 0 && distanceOver(pair, stretch, held_m, tolerance_m_, true) >= held_m;
     };
     const auto may_halve = [&](const Stretch& stretch) {
       return distances_.pieceEnd(stretch.from_s) < stretch.to_s && mayGoOn(pair);
@@ -337,7 +343,7 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
     Positions local;
     Eigen::AlignedBox3d box;
     for (const Vec3& p : *body.t1) {
-      local.push_back(body.pose_t1.inverse() * p);
+      local.push_back(outcome.step->bodies[of.frameOf()].pose_t1.inverse() * p);
       box.extend(local.back());
     }
     const std::array<Vec3, 8> corners = cornersOf(box);
@@ -345,7 +351,7 @@ std::string whyTooFast(const Outcome& outcome, const std::vector<SpeedBound>& bo
       constexpr double NO_PACE_S = 2e-9;
       const double lasts_s = path.time_s[k + 1] - path.time_s[k];
       if (lasts_s < NO_PACE_S) continue;
-      const double most_m = bounds[of.body].max_m_s * lasts_s * (1 + 1e-9) + 1e-12;
+      const double most_m = (bounds[of.body].max_m_s + of.relative_m_s) * lasts_s * (1 + 1e-9) + 1e-12;
       const auto isTooFar = [&](const Vec3& p) { return (of.pose[k + 1] * p - of.pose[k] * p).norm() > most_m; };
       if (std::none_of(corners.begin(), corners.end(), isTooFar) || std::none_of(local.begin(), local.end(), isTooFar))
         continue;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "dccd/assurance.h"
+#include "dccd/intended.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "step/parts.h"
@@ -46,6 +47,26 @@ std::optional<std::size_t> faster(const Positions& from, const Positions& to, do
     if ((sure && way_sq > (1 + SLACK) * limit_sq) || isFasterExactly(from[v], to[v], max_m_s, time_ns)) return v;
   }
   return std::nullopt;
+}
+
+/// Of a body that another one carries: why it is certainly farther from where it would be than its bound allows, or
+/// nobody knows; empty: it is not.
+std::string leftCarrier(const Step& before, const Step& now, std::size_t b, const SpeedBound& bound, StampNs time_ns) {
+  if (bound.carrier >= std::min(before.bodies.size(), now.bodies.size())) return "";  // then there are other bodies
+  const std::string& name = now.bodies[b].name;
+  const Positions carried = carriedTo(before, now, b, bound.carrier);
+  std::ostringstream text;
+  for (std::size_t v = 0; v < carried.size(); ++v) {
+    const Vec3& to = (*now.bodies[b].t1)[v];
+    const double rounding_m = tolerance::CLEARANCE * std::max(carried[v].norm(), to.norm());
+    const double off_m = (carried[v] - to).norm();
+    const bool is_known = std::isfinite(off_m) || !to.allFinite() || !(*before.bodies[b].t1)[v].allFinite();
+    if (is_known && !(off_m > bound.relative_m_s * secondsBetween(0, time_ns) + rounding_m)) continue;
+    text << "body '" << name << "' left '" << now.bodies[bound.carrier].name << "' by more than " << bound.relative_m_s
+         << " m/s: vertex " << v << " by " << off_m << " m in " << secondsBetween(0, time_ns) << " s";
+    break;
+  }
+  return text.str();
 }
 
 /// Whether something is occupied that was not before.
@@ -111,6 +132,8 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
         say("body '" + before.name + "' has another mesh");
         continue;
       }
+      if (const std::string left = leftCarrier(*step_, *outcome.step, b, assumed_[b], time_ns); !left.empty())
+        say(left);
       if (!std::isfinite(assumed_[b].max_m_s)) continue;
       bool was_faster = false;
       const auto look = [&](const Positions& from, const Positions& to, StampNs ns) {
@@ -218,7 +241,7 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
   forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
     if (!counts(outcome, pair) || isItself(pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
-    if (speeds.slowed == 0) return;
+    if (!speeds.slows) return;
     const double distance_m = distanceOf(outcome, insides, pair);
     const bool bounded = speeds.unbounded.empty();
     const double scale = bounded && distance_m > 0 ? speedScale(distance_m, speeds.slowed, speeds.other, law) : 0;

@@ -268,6 +268,24 @@ class CellTest(FolderTestCase):
         self.not_covered('a promise along an intended path', 'safe_until', longer)
         self.not_covered('a scale that may be along an intended path', 'speed_scale', lambda m: m.scale > 0 and setattr(m, 'scale', 1))
 
+    def test_limits(self):
+        self.cell('limits', 'limits: {max_m: 0.4, horizon_s: 0.1}\n')
+        self.holds()
+        said = [m for t, m, _ in self.said if t == OWN + 'limits' and m.speeds and not m.unknown]
+        self.assertGreater(len(said), 4)
+
+        def faster(message):
+            message.speeds = [speed + 0.5 for speed in message.speeds]
+
+        def fewer(message):
+            message.link, message.partners, message.speeds = message.link[1:], message.partners[1:], message.speeds[1:]
+            message.corners, message.normals = message.corners[8:], message.normals[1:]
+        for lie in (faster, fewer):
+            self.refuted('limits', lie, 'limits', 'on either side of no half-space')
+        self.cell('near_limits', 'limits: {max_m: 0.05, horizon_s: 0.01}\n')
+        self.holds()
+        self.refuted('limits', lambda m: setattr(m, 'most_speed', 5 * m.most_speed), 'limits', 'on either side of no half-space')
+
     def test_scale(self):
         self.cell('scale')
         self.holds()

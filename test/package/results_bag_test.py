@@ -74,7 +74,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
     def test_the_bag_of_results_has_every_topic_of_the_node(self):
         out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
         params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\neffects: {clearance: on}\n'  # more than the cloth's edges
-                          'max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}\n')
+                          'max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}\nlimits: {max_m: 0.3, horizon_s: 0.1}\n')
         self.analyze('all', self.bag, '--params', params, '-o', out)
         messages = by_topic(out)
         topics = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <random>
 
+#include "../../examples/guard_twist.h"
+#include "dccd/approach_limits.h"
 #include "support/query_property.h"
 
 namespace dccd {
@@ -66,6 +68,7 @@ double distanceOf(const Triangle& s, const Triangle& t) {
 }
 
 /// An arm of one to three triangles on a path of its own, and a cloth of as many, of which every vertex goes by itself.
+/// Half of the arms carry a towel, as large, whose vertices leave them.
 class Chase {
  public:
   explicit Chase(std::uint64_t seed) : random_(seed) {
@@ -84,30 +87,42 @@ class Chase {
     addPieces([&](double t) { return std::vector<Eigen::Isometry3d>{pose(t)}; }, horizon_s, second, 0.25, 1e-3, 40,
               path_);
     step_.bodies = {bodyOf("arm", arm_), bodyOf("cloth", cloth_)};
-    step_.bodies[0].rigid = true;
     step_.stamp_ns = 1;
+    step_.bodies[0].rigid = true;
+    if (seed % 2 == 0) return;
+    const Vec3 beside = away.cross(direction()).normalized();
+    towel_ = some((beside - 0.3 * away).normalized() * uniform(0.45, 0.7));
+    leaves_m_s_ = uniform(0.02, 0.5);
+    step_.bodies.push_back(bodyOf("towel", towel_));
+    path_.bodies.push_back({2, path_.bodies[0].pose, 0, leaves_m_s_});
+    path_.bend_m.assign(path_.bend_m.size(), 5 * path_.bend_m[0]);  // it reaches further from the arm's origin
   }
 
   /// What is promised.
   AlongPath ask(const std::optional<SpeedLaw>& law) {
-    Options options;
-    options.clearance.wanted = true;
-    options.clearance.max_m = 10;
-    History history;
-    const Outcome outcome = detect(step_, options, history);
     PathSearch search;
-    return search.run(outcome, options, {{SpeedBound::NONE}, {cloth_speed_, 0, false}}, law, path_);
+    return search.run(outcome(), options(), bounds(), law, path_);
+  }
+  ApproachLimits limits(double max_m, double horizon_s) {
+    ApproachSearch search;
+    return search.run(outcome(), options(), bounds(), max_m, horizon_s);
   }
 
   /// The least distance until then, of bodies that pass the path as `place` says: of each time its time on the path.
   double leastUntil(double until_s, const std::function<double(double)>& place) {
+    return leastOf(
+        until_s, [&](double t) { return pose(std::min(place(t), horizon_s)); }, path_.deviation_m,
+        path_.deviation_rate_m_s);
+  }
+  double leastOf(double until_s, const std::function<Eigen::Isometry3d(double)>& poseThen, double tube_m,
+                 double tube_m_s) {
     constexpr int LOOKS = 48;
-    Positions cloth = cloth_;
+    Positions cloth = cloth_, left(towel_.size(), Vec3::Zero());
     double least = distanceNow(arm_, cloth);
     for (int i = 1; i <= LOOKS; ++i) {
       const double t = until_s * i / LOOKS;
       Positions arm = arm_;
-      for (Vec3& p : arm) p = pose(std::min(place(t), horizon_s)) * p;
+      for (Vec3& p : arm) p = poseThen(t) * p;
       // Both go for the nearest of each other: the cloth vertex by vertex, the arm as far as its tube allows.
       const auto [from, to] = nearest(arm, cloth);
       const Vec3 along = (to - from).normalized();
@@ -115,18 +130,54 @@ class Chase {
         const Vec3 aim = i % 7 == 0 ? direction() : Vec3(-along);
         p += aim * (cloth_speed_ * until_s / LOOKS);
       }
-      for (Vec3& p : arm) p += along * path_.tubeAt(t) * (1 - 1e-9);
+      const double tube = (tube_m + tube_m_s * t) * (1 - 1e-9);
+      for (Vec3& p : arm) p += along * tube;
       least = std::min(least, distanceNow(arm, cloth));
+      if (towel_.empty()) continue;
+      Positions towel = towel_;
+      for (std::size_t v = 0; v < towel.size(); ++v) towel[v] = poseThen(t) * towel[v] + along * tube + left[v];
+      // It goes with the arm, tube included, and leaves it for what is nearer, the arm or the cloth.
+      const auto [own, arms] = nearest(towel, arm);
+      const auto [end, cloths] = nearest(towel, cloth);
+      const Vec3 aim = (arms - own).norm() < (cloths - end).norm() ? Vec3(arms - own) : Vec3(cloths - end);
+      for (std::size_t v = 0; v < towel.size(); ++v) {
+        const Vec3 goes = aim.normalized() * (leaves_m_s_ * until_s / LOOKS);
+        left[v] += goes;
+        towel[v] += goes;
+      }
+      least = std::min({least, distanceNow(towel, cloth), distanceNow(towel, arm)});
     }
     return least;
   }
 
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
   double startsApart() const { return distanceNow(arm_, cloth_); }
+  bool carries() const { return !towel_.empty(); }
+  /// For the cloth, and turning.
+  guard::Twist wanted() {
+    const auto [from, to] = nearest(arm_, cloth_);
+    guard::Twist twist;
+    twist << ((to - from).normalized() + uniform(0, 1) * direction()) * uniform(0, 4), direction() * uniform(0, 4);
+    return twist;
+  }
+  void drop() { towel_.clear(); }
 
   static constexpr double horizon_s = 1;
 
  private:
+  static Options options() {
+    Options options;
+    options.clearance.wanted = true;
+    options.clearance.max_m = 10;
+    return options;
+  }
+  std::vector<SpeedBound> bounds() const {
+    return {{SpeedBound::NONE}, {cloth_speed_, 0, false}, {SpeedBound::NONE, 0, false, 0, leaves_m_s_}};
+  }
+  Outcome outcome() const {
+    History history;
+    return detect(step_, options(), history);
+  }
   Vec3 direction() {
     Vec3 some;
     do {
@@ -173,8 +224,8 @@ class Chase {
   }
 
   std::mt19937_64 random_;
-  Positions arm_, cloth_;
-  double cloth_speed_ = 0;
+  Positions arm_, cloth_, towel_;
+  double cloth_speed_ = 0, leaves_m_s_ = 0;
   Vec3 way_, turn_;
   IntendedPath path_;
   Step step_;
@@ -183,13 +234,14 @@ class Chase {
 std::uint64_t motions() { return longRun() ? 100000 : 1500; }
 
 TEST(PathAdversary, NothingTouchesBeforeItIsSaidTo) {
-  std::size_t promised = 0, near = 0;
+  std::size_t promised = 0, near = 0, carried = 0;
   for (std::uint64_t seed = 0; seed < motions(); ++seed) {
     Chase chase(seed);
     const AlongPath along = chase.ask(std::nullopt);
     ASSERT_EQ(along.unused, "") << seed;
     if (!along.rests_on_path) continue;
     ++promised;
+    carried += chase.carries();
     const double until_s = along.until.seconds(), stops_s = chase.uniform(0, 1), pace = chase.uniform(0, 1);
     double least = SpeedBound::NONE;
     least = std::min(least, chase.leastUntil(until_s, [](double t) { return t; }));
@@ -200,6 +252,47 @@ TEST(PathAdversary, NothingTouchesBeforeItIsSaidTo) {
   }
   EXPECT_GT(promised, motions() / 2);
   EXPECT_GT(near, promised / 10) << "they do come near";
+  EXPECT_GT(carried, promised / 4);
+}
+
+// A body goes by a twist that is wanted towards the cloth, or turns, changed least so that it keeps to all half-spaces.
+TEST(ApproachAdversary, ATwistThatKeepsToAllHalfSpacesTouchesNothingWithinTheHorizon) {
+  std::size_t changed = 0, near = 0;
+  const std::uint64_t twists = longRun() ? 100000 : 10000;
+  for (std::uint64_t seed = 0; seed < twists; ++seed) {
+    Chase chase(seed);
+    chase.drop();
+    const double horizon_s = chase.uniform(0.05, 0.5);
+    const ApproachLimits limits = chase.limits(chase.uniform(0.2, 5), horizon_s);
+    if (!limits.unknown.empty()) continue;
+    ASSERT_EQ(limits.bodies, std::vector<std::uint16_t>{0}) << seed;
+    std::vector<guard::Row> rows;
+    for (const ApproachLimit& limit : limits.of) {
+      for (const Vec3& corner : limit.corner)
+        rows.push_back(guard::rowOf(corner, limit.normal, limit.speed_m_s, horizon_s, 0, Vec3::Zero(), {}));
+    }
+    const guard::Twist wanted = chase.wanted();
+    bool is_found = false;
+    guard::Twist twist = guard::nearest(rows, wanted, is_found);
+    const double fastest = twist.head<3>().norm() + 0.2 * twist.tail<3>().norm();
+    if (fastest > limits.most_speed_m_s) twist *= limits.most_speed_m_s / fastest;
+    if (!is_found || !guard::obeys(rows, twist)) continue;
+    changed += twist != wanted;
+    const Vec3 turn = twist.tail<3>();
+    const double least = chase.leastOf(
+        horizon_s,
+        [&](double t) {
+          Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
+          at.translation() = twist.head<3>() * t;
+          if (turn.norm() > 0) at.linear() = Eigen::AngleAxisd(turn.norm() * t, turn.normalized()).toRotationMatrix();
+          return at;
+        },
+        0, 0);
+    ASSERT_GT(least, 0) << "seed " << seed;
+    near += least < 0.3 * chase.startsApart();
+  }
+  EXPECT_GT(changed, twists / 10);
+  EXPECT_GT(near, twists / 20);
 }
 
 // The arm obeys: it goes on at the scale for the reaction time, and is then slower evenly until it stands. The cloth

@@ -1,5 +1,6 @@
 // ~intended of a live node: a motion of the robot's joints, one that is wrong, and an arm that leaves it.
 #include <deformable_ccd/AlongPath.h>
+#include <deformable_ccd/Limits.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
 #include <deformable_ccd/WouldTouch.h>
@@ -8,6 +9,7 @@
 #include <rosgraph_msgs/Log.h>
 #include <tf2_msgs/TFMessage.h>
 #include <trajectory_msgs/JointTrajectory.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
 #include <atomic>
@@ -31,6 +33,7 @@ struct Intended : ::testing::Test {
   Probe<deformable_ccd::SafeUntil> promises{node, name + "/safe_until"};
   Probe<deformable_ccd::AlongPath> paths{node, name + "/along_path"};
   Probe<deformable_ccd::SpeedScale> scales{node, name + "/speed_scale"};
+  Probe<visualization_msgs::MarkerArray> markers{node, name + "/markers"};
   Probe<rosgraph_msgs::Log> lines{node, "/rosout"};
   ros::Publisher intended = advertiseAndWait<JointTrajectory>(node, name + "/intended");
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
@@ -96,6 +99,12 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
   expectThePath("with a motion");
   EXPECT_EQ(paths.last().bodies, std::vector<std::string>{"plate"});
   EXPECT_NEAR(paths.last().ahead, 1, 0.1);
+  EXPECT_TRUE(waitUntil([&] {
+    const auto shown = markers.last().markers;
+    return std::any_of(shown.begin(), shown.end(), [](const visualization_msgs::Marker& one) {
+      return one.ns == "intended" && std::abs(one.scale.x - 2 * 0.02) < 0.002 && one.points.size() > 1;
+    });
+  })) << "RViz shows the tube";
   const auto assumed = promises.last().assumed;
   EXPECT_TRUE(std::any_of(assumed.begin(), assumed.end(), [](const std::string& sentence) {
     return sentence.find("'plate' go along the intended path") != std::string::npos;
@@ -109,7 +118,8 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
   for (const auto& change : std::vector<std::function<void(JointTrajectory&)>>{
            [](JointTrajectory& t) { t.points[1].positions = {std::nan("")}; },
            [](JointTrajectory& t) { t.points[1].time_from_start = ros::Duration(0); },
-           [](JointTrajectory& t) { t.header.stamp -= ros::Duration(60); }}) {
+           [](JointTrajectory& t) { t.header.stamp -= ros::Duration(60); },
+           [](JointTrajectory& t) { t.header.stamp -= ros::Duration(2); }}) {
     intended.publish(holds());
     expectThePath("once more");
     wrong = holds();
@@ -128,6 +138,15 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
   EXPECT_EQ(count("joint_names[0] 'elbow'"), 1);
   EXPECT_EQ(count("points[1]/positions[0] is nan"), 1) << "within five seconds of the first one";
   EXPECT_EQ(count("header/stamp is late"), 1);
+  EXPECT_EQ(count("header/stamp goes back by"), 1);
+  for (const double lasts_s : {30.0, 0.5}) {
+    JointTrajectory another = holds();
+    another.points[1].time_from_start = ros::Duration(lasts_s);
+    intended.publish(another);
+    expectThePath("replaced in mid-motion");
+  }
+  EXPECT_TRUE(isSaid("has ended"));
+  expectBoundsAlone("after its end");
   intended.publish(holds());
   expectThePath("before frames stay away");
   pauses = true;
@@ -152,6 +171,21 @@ TEST_F(Intended, AMotionIsLookedAheadUntilOneIsWrongOrTheArmIsElsewhere) {
     });
   }));
   EXPECT_TRUE(waitUntil([&] { return std::abs(promises.last().seconds - 0.149 / 0.6) < 1e-3; }));
+}
+
+TEST_F(Intended, LimitsTellAControllerHowFastThePlateMayComeUp) {
+  Probe<deformable_ccd::Limits> limits(node, name + "/limits");
+  EXPECT_TRUE(waitUntil([&] { return limits.count() > 0 && !limits.last().speeds.empty(); }));
+  const deformable_ccd::Limits said = limits.last();
+  EXPECT_TRUE(said.unknown.empty());
+  EXPECT_EQ(said.links, std::vector<std::string>{"plate"});
+  EXPECT_EQ(said.partners, std::vector<std::string>(said.speeds.size(), "mesh"));
+  EXPECT_NEAR(said.origins.at(0).z, 0.1, 1e-9);
+  EXPECT_NEAR(std::abs(said.normals.at(0).z), 1, 1e-6);
+  EXPECT_NEAR(*std::min_element(said.speeds.begin(), said.speeds.end()), 0.099 / 0.2 - 0.1, 0.02);
+  EXPECT_NEAR(said.most_speed, 0.4 / 0.2 - 0.1, 1e-6);
+  EXPECT_EQ(said.corners.size(), 8 * said.speeds.size());
+  EXPECT_FALSE(said.assumed.empty());
 }
 
 TEST_F(Intended, APlannerAsksBeforeItSends) {

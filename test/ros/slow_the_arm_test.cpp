@@ -1,8 +1,10 @@
 // ~safe_until and ~speed_scale of a live node; examples/slow_the_arm in C++ and Python.
+#include <deformable_ccd/Limits.h>
 #include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/SpeedScale.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
+#include <geometry_msgs/TwistStamped.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 #include <std_msgs/Float64.h>
@@ -20,6 +22,56 @@
 namespace dccd {
 namespace test {
 namespace {
+
+// A hand that wants to go down and aside, 0.1 m above what comes no nearer: it may go down as fast as the half-space
+// says, less what it went since the stamp, and aside as it likes, until the limits are old or something is unknown.
+TEST(GuardTwist, BothClientsChangeTheTwistLeastAndStandWhereNothingIsKnown) {
+  ros::NodeHandle node;
+  std::array<Probe<geometry_msgs::TwistStamped>, 2> twists{
+      Probe<geometry_msgs::TwistStamped>(node, "/guard_cpp/twist"),
+      Probe<geometry_msgs::TwistStamped>(node, "/guard_python/twist")};
+  ros::Publisher monitor = advertiseAndWait<deformable_ccd::Limits>(node, "/played/limits", false, 2);
+  ros::Publisher wanted = advertiseAndWait<geometry_msgs::TwistStamped>(node, "/wanted", false, 2);
+  deformable_ccd::Limits limits;
+  limits.horizon = 0.5;
+  limits.links = {"hand"};
+  limits.origins.resize(1);
+  limits.reaches = {0.1};
+  limits.most_speed = 2;
+  limits.link = {0};
+  limits.partners = {"octomap"};
+  limits.corners.resize(8);
+  limits.normals.resize(1);
+  limits.normals[0].z = -1;
+  limits.speeds = {0.2};
+  const auto expectTwist = [&](bool renews, double down_m_s, double aside_m_s, const std::string& why) {
+    EXPECT_TRUE(waitUntil([&] {
+      if (renews) {
+        limits.header.stamp = ros::Time::now();
+        monitor.publish(limits);
+      }
+      geometry_msgs::TwistStamped asked;
+      asked.header.stamp = ros::Time::now();
+      asked.twist.linear.x = 0.3;
+      asked.twist.linear.z = -1;
+      wanted.publish(asked);
+      ros::WallDuration(0.03).sleep();
+      return std::all_of(twists.begin(), twists.end(), [&](auto& told) {
+        const auto& v = told.last().twist.linear;
+        return told.count() > 0 && std::abs(v.z + down_m_s) < 0.03 && std::abs(v.x - aside_m_s) < 1e-6;
+      });
+    })) << why
+        << ": " << twists[0].last().twist.linear << twists[1].last().twist.linear;
+  };
+  expectTwist(true, 0.2, 0.3, "down as fast as it may");
+  expectTwist(false, 0, 0, "the limits are old");
+  limits.speeds = {2};
+  expectTwist(true, 1, 0.3, "nothing limits it");
+  limits.most_speed = 0.5;
+  expectTwist(true, 0.5 / std::sqrt(1.09), 0.15 / std::sqrt(1.09), "nor is it faster than all links may be");
+  limits.unknown = {"nobody knows"};
+  expectTwist(true, 0, 0, "something is not known");
+}
 
 struct SlowTheArm : ::testing::Test {
   ros::NodeHandle node;

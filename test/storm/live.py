@@ -27,10 +27,10 @@ PATIENCE_S, TAKEN_S, AFTER_NS, TICK_NS = 30, .002, 10 ** 9, 20 * 10 ** 6
 
 
 def said_topics():
-    from deformable_ccd.msg import ClearanceArray, ContactArray, PatchArray, PatchEvent, SafeUntil, SpeedScale, State
+    from deformable_ccd.msg import AlongPath, ClearanceArray, ContactArray, Limits, PatchArray, PatchEvent, SafeUntil, SpeedScale, State
     from std_msgs.msg import Bool
     return {'state': State, 'clear': Bool, 'contacts': ContactArray, 'clearance': ClearanceArray, 'safe_until': SafeUntil, 'speed_scale': SpeedScale,
-            'patches': PatchArray, 'events': PatchEvent}
+            'patches': PatchArray, 'events': PatchEvent, 'along_path': AlongPath, 'limits': Limits}
 
 
 def play(folder):

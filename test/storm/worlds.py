@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import rospy
 from deformable_ccd.msg import MeshStamped
-from geometry_msgs.msg import Point, Pose, PoseArray, TransformStamped
+from geometry_msgs.msg import Point, Pose, PoseArray, TransformStamped, TwistStamped
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2, PointField
 from shape_msgs.msg import MeshTriangle
@@ -97,6 +97,7 @@ class World:
         if not self.tame:
             for kind in faults if faults is not None else [r.choice(FAULTS) for _ in range(r.choice([0, 1, 1, 2, 3]))]:
                 self.fault(kind)
+        self.ahead(random.Random(seed + 2 * NS))
         self.rows.sort(key=lambda row: row[2])
         for before, row in zip(self.rows, self.rows[1:]):  # no two at once
             row[2] = max(row[2], before[2] + 1000)
@@ -261,6 +262,23 @@ class World:
                 row['vertices'] = {name: [0, 1, 2, 3]}
             p.setdefault('expected_contacts', []).append(row)
             p['phase'] = r.choice([row['phase'], ''])
+
+    def ahead(self, r):
+        """Limits, and twists that the finger is said to go by: some right, some late, some of a frame that is not there."""
+        p = self.params
+        if 'max_speed_m_s' not in p or r.random() < .5:
+            return
+        p['limits'] = {'max_m': r.choice([.1, .3, .5]), 'horizon_s': r.choice([.05, .2])}
+        if 'finger' not in p['bodies'] or r.random() < .5:
+            return
+        p['intent'] = {'horizon_s': r.choice([.1, .5]), 'deviation_m': r.choice([.01, .1]), 'deviation_rate_m_s': r.choice([0, .2])}
+        for at in [.05 + .1 * k for k in range(int(10 * self.seconds))]:
+            message = TwistStamped()
+            message.header.stamp = stamp(self.ns(at - (2 if r.random() < .1 else 0)))
+            message.header.frame_id = self.chain[-1] if r.random() < .9 else 'elsewhere'
+            for axis in 'xyz':
+                setattr(message.twist.linear, axis, r.choice([0, r.uniform(-.2, .2), r.uniform(-.2, .2), math.nan if r.random() < .1 else 0]))
+            self.add('/collision_monitor/intended', message, at, r.uniform(0, .05))
 
     def options(self):
         r, p = self.r, self.params

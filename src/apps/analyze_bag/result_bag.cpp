@@ -135,6 +135,8 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
     write("clearance", at, toClearanceArray(outcome, bodies, frame));
   }
   addState(outcome, pipeline, at);
+  if (pipeline.config().limits && pipeline.statement().assurance.proved)
+    write("limits", at, toLimits(outcome, pipeline.limitsAfter(outcome), pipeline.speedBounds(), frame));
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
   diagnostics_.add(outcome, context.latency_s);
   const MonitorConfig& config = pipeline.config();

@@ -46,6 +46,8 @@ class NearestSearch {
     bool at_end = false;                  ///< at t1 alone
     Deadline deadline;
     const std::array<std::uint32_t, 2>* first = nullptr;  ///< items to begin with, probably near; null: none
+    const std::array<std::uint32_t, 2>* near = nullptr;   ///< the same, of other places of the two
+    double gives_up_m = 0;  ///< once two are nearer than this, how near they are does not matter
   };
   /// Of two different trees every pair of items is compared.
   struct AllPairs {
@@ -70,7 +72,10 @@ class NearestSearch {
         if (prunesAll(a, b)) return result();
       }
     } else if (!pairs.ITSELF) {
-      compareNearBoxes(a, b, meet);
+      if (goal.near)
+        compare(a, b, {0, 0, (*goal.near)[0], (*goal.near)[1], true}, meet);
+      else
+        compareNearBoxes(a, b, meet);
     }
     push(a, a.root(), b, b.root(), pairs);
     for (std::uint32_t taken = 0; !touching_.empty() || !heap_.empty(); ++taken) {
@@ -81,8 +86,9 @@ class NearestSearch {
         }
       }
       Pair pair = take();
-      const bool is_done = prunes(pair.squared);            // nothing else is nearer
-      if (is_done || (plane_ > 0 ? isOver() : isLate())) {  // boxes along a plane take long
+      const bool is_done =
+          prunes(pair.squared) || found_.upper_m < goal_.gives_up_m;  // nothing else is nearer, or asked
+      if (is_done || (plane_ > 0 ? isOver() : isLate())) {            // boxes along a plane take long
         found_.cut = found_.cut || !is_done;
         settleSquared(pair.squared);
         break;

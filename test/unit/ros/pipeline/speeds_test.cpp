@@ -54,6 +54,13 @@ TEST(SpeedParameters, HoldForAllBodiesAndForOne) {
   EXPECT_EQ(config.speed_law->stopping_time_s, 0.2);
   EXPECT_EQ(config.speed_law->uncertainty_m, 0);
   EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::CONSERVATIVE);
+  const MonitorConfig held = read(
+      "max_speed_m_s: 0.5\nbodies: {pad: {rigid: {mesh: a.stl, frame: hand}}, cloth: {topic: a, carried_by: hand, "
+      "max_relative_speed_m_s: 0.2}}\nclock_body: cloth\nlimits: {max_m: 0.3, horizon_s: 0.1}\n");
+  EXPECT_EQ(held.bodies[0].speed.relative_m_s, 0.2);
+  EXPECT_EQ(held.bodies.at(held.bodies[0].speed.carrier).body.name, "pad");
+  EXPECT_EQ(held.limits->max_m, 0.3);
+  EXPECT_EQ(config.bodies[0].speed.carrier, SpeedBound::NO_CARRIER);
   const MonitorConfig off = read("max_speed_m_s: 0.5\neffects: {clearance: off}\n");
   EXPECT_FALSE(off.promises());
 }
@@ -78,6 +85,15 @@ TEST(SpeedParameters, MistakesAreNamed) {
            {"bodies: {cloth: {topic: a}, pad: {rigid: {mesh: a.stl, frame: f}, max_acceleration_m_s2: 1}}\n",
             "max_acceleration_m_s2 has no meaning for a rigid body"},
            {"bodies: {cloth: {topic: a, slows_down: 1}}\n", "slows_down"},
+           {"bodies: {cloth: {topic: a, carried_by: hand}}\n", "max_relative_speed_m_s"},
+           {"bodies: {cloth: {topic: a, carried_by: hand, max_relative_speed_m_s: 1}}\n",
+            "carried_by is 'hand', which carries no rigid body or link that is watched"},
+           {"bodies: {cloth: {topic: a}, table: {topic: b, motion: static, carried_by: a, max_relative_speed_m_s: "
+            "1}}\n",
+            "carried_by is for what deforms"},
+           {"limits: {max_m: 0.1, horizon_s: 0.1}\n", "limits needs distances and a speed bound"},
+           {"max_speed_m_s: 1\nlimits: {max_m: 0.1}\n", "limits/horizon_s"},
+           {"max_speed_m_s: 1\nlimits: {max_m: 0.6, horizon_s: 0.1}\n", "limits/max_m is more than clearance/max_m"},
        }) {
     EXPECT_TRUE(mentions(mistake(yaml), part)) << yaml << mistake(yaml);
   }
