@@ -93,6 +93,9 @@ double distanceOf(const Outcome& outcome, const Insides& insides, const Clearanc
 }
 
 Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
+  const auto isCarried = [&](std::uint16_t body) { return bounds[body].carrier != SpeedBound::NO_CARRIER; };
+  const auto frameOf = [&](std::uint16_t body) { return isCarried(body) ? bounds[body].carrier : body; };
+  const auto slows = [&](std::size_t body) { return bounds[body].slows_down && bounds[body].max_m_s > 0; };
   const auto sumOf = [&](const auto& boundOf) {
     Speeds speeds;
     for (const std::uint16_t body : pair.body) {
@@ -106,12 +109,10 @@ Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector
       double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
       if (!std::isfinite(bound)) speeds.unbounded = outcome.step->bodies[body].name;
       sum = sum == 0 ? bound : roundedUp(sum + bound);
-      speeds.slows = speeds.slows || (bounds[body].slows_down && bounds[body].max_m_s > 0);
+      speeds.slows = speeds.slows || slows(body) || slows(frameOf(body));  // what swings on goes with its carrier
     }
     return speeds;
   };
-  const auto isCarried = [&](std::uint16_t body) { return bounds[body].carrier != SpeedBound::NO_CARRIER; };
-  const auto frameOf = [&](std::uint16_t body) { return isCarried(body) ? bounds[body].carrier : body; };
   const Speeds speeds = sumOf([&](std::uint16_t body) { return bounds[body].max_m_s; });
   const bool by_one =
       !isItself(pair) && pair.body[1] != OBSTACLE_BODY && frameOf(pair.body[0]) == frameOf(pair.body[1]);

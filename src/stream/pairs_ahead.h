@@ -94,7 +94,7 @@ double distanceOf(const Outcome& outcome, const Insides& insides, const Clearanc
 /// Of both partners [m/s], or of both in the frame of what carries the two, whichever is less; the map stands still.
 struct Speeds {
   double slowed = 0, other = 0;  // of what slows down, and of what does not
-  bool slows = false;            // something of the two slows down
+  bool slows = false;            // something of the two, or what carries it, slows down
   std::string unbounded;         // a body of which nobody says how fast it is
   /// Of both together, rounded up.
   double closing() const { return slowed > 0 && other > 0 ? roundedUp(slowed + other) : slowed + other; }
