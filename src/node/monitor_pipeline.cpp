@@ -189,7 +189,8 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   frame_answered_ = frame_answered_ || outcome.answered;
   answerForCell(outcome.arrival_ns, now_ns, outcome);
   doubtMap(outcome);
-  if (outcome.answered) outcome.claim.answer(Question::NEWEST_FRAME, "");  // from now on Liveness watches
+  // From now on Liveness watches. On a line of its own, so that run_mutants.py finds where the witness ends.
+  if (outcome.answered) outcome.claim.answer(Question::NEWEST_FRAME, "");
   if (config_.promises()) {
     promises_.setBounds(speedBounds());
     promises_.follow(outcome);
