@@ -399,7 +399,7 @@ def turned(radius, half):
 
 
 def links(path, files):
-    """Each collision element of a URDF: link, positions, surface, lost. Of what is round a mesh that lies within it."""
+    """Each collision element of a URDF: link, positions, surface, lost, whether it is round: then its mesh lies within it."""
     tree = xml.parse(path).getroot()
     for link in tree.findall('link'):
         for element in link.findall('collision'):
@@ -420,7 +420,7 @@ def links(path, files):
                 (cr, cp, cy), (sr, sp, sy) = np.cos([r, p, y]), np.sin([r, p, y])
                 q = (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
                 points = points @ rotation(q).T + numbers('xyz', of=origin)
-            yield link.get('name'), points, surface, lost
+            yield link.get('name'), points, surface, lost, shape.tag in ('cylinder', 'sphere')
 
 
 # -- octomaps -----------------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 # Octomap bytes to voxel surfaces: the only user of liboctomap, free of ROS. The benchmarks need it, too.
-find_package(octomap REQUIRED)  #catkin_lint: ignore duplicate_find
+#catkin_lint: ignore_once duplicate_find
+find_package(octomap REQUIRED)
 file(GLOB OCTOMAP_SOURCES CONFIGURE_DEPENDS src/octomap/*.cpp)
 add_library(deformable_ccd_octomap SHARED ${OCTOMAP_SOURCES})
 target_include_directories(deformable_ccd_octomap PUBLIC include PRIVATE src)

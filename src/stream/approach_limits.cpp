@@ -195,6 +195,8 @@ ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& option
     if (isLink(b)) result.bodies.push_back(b);
   max_m = std::min(max_m, options.clearance.max_m);
   result.most_speed_m_s = max_m / horizon_s;
+  // A map whose frame moves may go any way.
+  const double map_m_s = outcome.step->map.way.empty() ? 0 : SpeedBound::NONE;
   const Insides insides(outcome);
   forPairs(outcome, [&](const Clearance& row, std::size_t) {
     if (!counts(outcome, row) || isItself(row)) return;
@@ -202,14 +204,12 @@ ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& option
     for (const bool swaps : {false, true}) {
       const std::uint16_t link = row.body[swaps], other = row.body[!swaps];
       if (!isLink(link) || (other != OBSTACLE_BODY && bounds[other].carrier == link)) continue;
-      // A map whose frame moves may go any way.
-      const double map_m_s = outcome.step->map.way.empty() ? 0 : SpeedBound::NONE;
-      const double partner_m_s = other == OBSTACLE_BODY ? map_m_s : bounds[other].max_m_s;
-      const double held_m = (separationOf(outcome, row) + largestRadius(bodies[link]) +
-                             (other == OBSTACLE_BODY ? 0 : largestRadius(bodies[other]))) *
-                            (1 + 1e-9);
+      const bool on_map = other == OBSTACLE_BODY;
+      const double partner_m_s = on_map ? map_m_s : bounds[other].max_m_s;
+      const double radii_m = largestRadius(bodies[link]) + (on_map ? 0 : largestRadius(bodies[other]));
+      const double held_m = (separationOf(outcome, row) + radii_m) * (1 + 1e-9);
       if (!std::isfinite(partner_m_s)) {
-        result.unknown.push_back(unboundedReason(nameOf(outcome, other)));
+        result.unknown.push_back(unboundedReason(on_map ? "octomap" : bodies[other].name));
       } else if (start_m == 0) {
         result.unknown.push_back(zeroReason(outcome, insides, row));
       } else {
@@ -223,12 +223,11 @@ ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& option
           return addLimits(own, to, partner, row, max_m, held_m, partner_m_s, deadline, limit, result);
         };
         const std::size_t before = result.of.size();
-        const bool is_known = other == OBSTACLE_BODY
-                                  ? add(shapes_->map, outcome.step->map.map_from_fixed * bodies[link].pose_t1)
-                                  : add(shapes_->of(bodies[other], other).fixed, bodies[link].pose_t1);
+        const bool is_known = on_map ? add(shapes_->map, outcome.step->map.map_from_fixed * bodies[link].pose_t1)
+                                     : add(shapes_->of(bodies[other], other).fixed, bodies[link].pose_t1);
         if (!is_known) result.unknown.push_back("of " + pairOf(outcome, row) + " there was no time to look at all");
         const Eigen::Isometry3d back = outcome.step->map.map_from_fixed.inverse();
-        for (std::size_t i = before; other == OBSTACLE_BODY && i < result.of.size(); ++i) {
+        for (std::size_t i = before; on_map && i < result.of.size(); ++i) {
           for (Vec3& corner : result.of[i].corner) corner = back * corner;
           result.of[i].normal = back.linear() * result.of[i].normal;
         }

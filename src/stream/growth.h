@@ -22,6 +22,11 @@ class Growth {
     OccupiedLeaf voxel;
     StampNs free_ns;
   };
+  void clear() {  // allocates nothing, unlike a new one
+    grown_.clear();
+    voxels_.clear();
+    too_many_ns_ = NEVER_NS;
+  }
   /// It appeared out of reach, or is in doubt. free_ns: when it was last free; now_ns: of the map that shows it so.
   void add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns);
   /// Forgets what was free no later than `since_ns`, or was not occupied ever since it was added. now, before: what

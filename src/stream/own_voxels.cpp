@@ -28,7 +28,7 @@ void OwnVoxelFinder::forget() {
   known_.clear();
   past_.clear();
   unseen_ = UnseenSpace();
-  growth_ = Growth();
+  growth_.clear();
   entered_.clear();
   remembered_.clear();
   seen_.clear();
