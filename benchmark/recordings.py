@@ -302,7 +302,7 @@ def ur5e(data, folder, frames):
 
         def arm(s):
             found = []
-            for link, p, _, _ in parts:
+            for link, p, *_ in parts:
                 while link != 'base_link':
                     link, name, xyz, rpy = chain[link]
                     p = placed.carried(pose(name, xyz, rpy, s), p)
