@@ -57,7 +57,8 @@ if os.environ.get('DEFORMABLE_CCD_IN_BARE_ROOT'):
 if os.environ.get('DEFORMABLE_CCD_SANITIZED'):
     NOT_RUN['rosrun nodelet'] = "a library built with a sanitizer cannot be loaded by ROS's own program; nodelet.test loads it"
 # Of each example that follows the monitor: a topic of its own, and what it says there.
-CLIENTS = {'stop_the_arm': ('/stop_the_arm/stop', 'data: (True|False)'), 'slow_the_arm': ('/slow_the_arm/scale', r'data: [\d.]+')}
+CLIENTS = {'stop_the_arm': ('/stop_the_arm/stop', 'data: (True|False)'), 'slow_the_arm': ('/slow_the_arm/scale', r'data: [\d.]+'),
+           'guard_twist': ('/guard_twist/twist', r'x: -?0\.0')}
 # What stands for a value of the reader's in a command, and what is put there.
 PLACEHOLDERS = {'FILE': None, 'v,a,b,c': '100,0,1,30', 'v,x,y,z': '0,32768,32768,32768'}
 
