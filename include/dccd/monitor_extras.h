@@ -47,8 +47,7 @@ constexpr double MOST_PROMISED_S = 10;
 /// It rests on this:
 /// - a vertex is where the step ends, or within its uncertainty radius of there (d is less by the radii);
 /// - no vertex is faster afterwards than its body's bound; a body against itself counts with twice its bound; one that
-/// is
-///   carried leaves its carrier no faster than it may (v is then the sum of these, in the carrier's frame);
+///   is carried leaves its carrier no faster than it may (v is then the sum of these, in the carrier's frame);
 /// - the surface stays straight between its vertices, and has the same edges and faces;
 /// - the map gets no voxel, and stays where it is. Bodies and features that the step leaves out are not spoken of, nor
 ///   are a body's own features that are neighbours (ClearanceOptions::self_m; where that is 0 all of them) or features

@@ -73,8 +73,8 @@ void MonitorPipeline::followIntended() {
       why_void = [path = beginningAt(*path, step), before = answered_->step](const Outcome& next) {
         const double ahead_s = secondsBetween(before->stamp_ns, next.stamp_ns);
         Step now = *next.step;
-        for (const IntendedPath::Of& of :
-             path.bodies)  // how far what is carried has left its place PromiseWatch looks at
+        // How far what is carried has left its place PromiseWatch looks at.
+        for (const IntendedPath::Of& of : path.bodies)
           if (of.frameOf() != of.body && std::max<std::size_t>(of.body, of.carrier) < now.bodies.size())
             now.bodies[of.body].t1 = share(carriedTo(*before, now, of.body, of.carrier));
         const PlaceOnPath place = placeOnPath(path, now, 0, ahead_s);

@@ -11,8 +11,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
-// Along a side, where voxels are the smallest: of a camera's points, and of points all around, whose far ends are
-// followed one by one. With fewer too few rays are left.
+// Along a side, where voxels are the smallest: of one picture, where 2 leave too few rays of points in no order, and of
+// six around the sensor, where more cells take longer and clear no more.
 constexpr double CELLS_A_VOXEL = 2.5, CELLS_ALL_AROUND = 1.5;
 constexpr double CELLS_A_POINT = 2;    // at most
 constexpr double MOST_TANGENT = 2;     // of a face that is the only one

@@ -115,17 +115,20 @@ TEST_F(Tracks, WhatIsCarriedGoesAsItsFrameDoes) {
 }
 
 // Between two knots what turns about a far joint leaves the way of whole poses: more of them are asked for.
+/// A lever of 1 m swings through its lowest point, where the tip is at this height; at both ends it is 20 mm above.
+std::function<Eigen::Isometry3d(double)> swing(double height) {
+  return [height](double t) {
+    const Eigen::AngleAxisd turn(4 * (t - 0.15), Vec3::UnitX());
+    return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1 + height) * turn * Eigen::Translation3d(0, 0, -1));
+  };
+}
+
 TEST_F(Tracks, WhatTurnsAboutAFarJointIsFollowedBetweenKnots) {
   said.has_ends_alone = true;
   for (const bool is_rigid : {false, true}) {
     rigid = is_rigid;
     for (const double height : {0.004, -0.004}) {
-      // A lever of 1 m swings through its lowest point, where the tip is at this height; at both ends it is 20 mm
-      // above.
-      said.fixed_from["hand"] = [height](double t) {
-        const Eigen::AngleAxisd turn(4 * (t - 0.15), Vec3::UnitX());
-        return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1 + height) * turn * Eigen::Translation3d(0, 0, -1));
-      };
+      said.fixed_from["hand"] = swing(height);
       const Outcome outcome = last();
       ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
       EXPECT_EQ(assuranceOf(outcome).clear(), height > 0) << is_rigid;
@@ -253,10 +256,7 @@ TEST_F(MapTracks, AMapThatTurnsIsFollowedBetweenKnots) {
   said.has_ends_alone = true;
   key = {32768, 32768, 32768};
   for (const double height : {0.009, 0.001}) {
-    said.fixed_from["odom"] = [height](double t) {
-      const Eigen::AngleAxisd turn(4 * (t - 0.15), Vec3::UnitX());
-      return Eigen::Isometry3d(Eigen::Translation3d(0, 0, 1 + height) * turn * Eigen::Translation3d(0, 0, -1));
-    };
+    said.fixed_from["odom"] = swing(height);
     const Outcome outcome = last();
     ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
     EXPECT_EQ(assuranceOf(outcome).clear(), height > 0.005) << height;
