@@ -102,7 +102,7 @@ class BareRoot:
         # Nor need modules be compiled that nobody imports, which takes longer than to unpack them; what is imported compiles then.
         for name in ('py3compile', 'py3clean'):
             subprocess.run(['dpkg-divert', '--root', str(self.folder), '--quiet', '--no-rename', '--add', '/usr/bin/' + name], check=True)
-            (self.folder / 'usr/bin' / name).symlink_to('true')
+            (self.folder / 'usr/bin' / name).symlink_to('/bin/true')  # Debian 11 has it there alone
         if self.run('true').returncode != 0:
             raise CannotMake('this machine may not mount /proc for a root')
 
