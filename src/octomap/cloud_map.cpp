@@ -49,7 +49,7 @@ struct CloudMap::Impl {
   CloudTree tree;
   ViewLimits limits;
   KeyBox box;
-  TreeLeaves leaves;
+  TreeLeaves leaves, next_leaves;
   ViewReader reader;
 
   explicit Impl(const CloudMapOptions& options) : tree(options.resolution_m) {
@@ -80,8 +80,10 @@ struct CloudMap::Impl {
   void update(Look& look, std::size_t max_bytes) {
     const std::size_t taken = reader.memoryBytes() + MORE_NODES * NODE_BYTES;
     const std::size_t nodes = max_bytes > taken ? (max_bytes - taken) / NODE_BYTES : 0;
-    OctreeUpdate<Look> update(tree, leaves, reader.ends, look, {box, nodes});
-    leaves = update.run();
+    next_leaves.clear();
+    OctreeUpdate<Look> update(tree, leaves, reader.ends, look, {box, nodes}, next_leaves);
+    update.run();
+    std::swap(leaves, next_leaves);
     if (update.isFull()) noRoom(max_bytes);
   }
 };

@@ -7,7 +7,6 @@
 namespace dccd {
 namespace {
 
-constexpr float NOWHERE = std::numeric_limits<float>::infinity();
 constexpr double SQRT2 = 1.4142135623730951, SQRT3 = 1.7320508075688772;
 // Of a depth as a float, and of a pixel: more than what the numbers cannot tell.
 constexpr double DEPTH_ROUNDING = 1e-6, ROUNDING_PX = 1e-3;
@@ -47,6 +46,7 @@ void DepthPicture::build(const PictureGeometry& geometry) {
   spread_ = project_.cwiseAbs().rowwise().sum();
   pixel_ways_ = geometry.camera_from_map.transpose() * lens.inverse() / geometry.resolution_m;
   square_px_ = std::min(geometry.fx, geometry.fy) * geometry.resolution_m / SQRT2;  // of the ball in it
+  beyond_.fill(NO_CUBE);
   findHoles();
   level_count_ = 1;
   while (levels_[level_count_ - 1].width > 1 || levels_[level_count_ - 1].height > 1) {
@@ -106,35 +106,13 @@ void DepthPicture::reduce(const Level& from, Level& to, bool is_first) const {
   }
 }
 
-Seen DepthPicture::look(const OctreeCube& cube) {
-  const Level& all = levels_[0];
-  const double half = 0.5 * cube.size();
-  const Eigen::Vector3d center = Eigen::Vector3d(cube.x + half, cube.y + half, cube.z + half) - geometry_.sensor;
-  const Eigen::Vector3d at = project_ * center, reach = half * spread_;
-  const double margin = DEPTH_ROUNDING * (std::abs(at[2]) + reach[2]);
-  const double nearest = at[2] - reach[2] - margin, farthest = at[2] + reach[2] + margin;
-  const double away2 = center.squaredNorm(), radius = SQRT3 * half;
-  const double out = geometry_.range + radius, in = std::max(0.0, geometry_.range - radius);
-  if (farthest <= 0 || away2 > out * out) return Seen::NONE;
-  const double of_near = nearest > 0 ? 1 / nearest : std::numeric_limits<double>::infinity(), of_far = 1 / farthest;
-  const double off = geometry_.off_px + ROUNDING_PX;
-  const auto pixels = [&](int axis, double middle, std::int32_t count, std::int32_t& first, std::int32_t& last) {
-    const double lo = at[axis] - reach[axis], hi = at[axis] + reach[axis];
-    const double from = middle + lo * (lo >= 0 ? of_far : of_near) - off;
-    const double to = middle + hi * (hi >= 0 ? of_near : of_far) + off;
-    first = from > 0 ? upOf(std::min<double>(from, count)) : 0;
-    last = to < count - 1 ? (to < 0 ? -1 : static_cast<std::int32_t>(to)) : count - 1;
-    return from >= 0 && to <= count - 1;
-  };
-  const bool is_inside =
-      pixels(0, geometry_.cx, all.width, area_.u0, area_.u1) & pixels(1, geometry_.cy, all.height, area_.v0, area_.v1);
-  if (area_.u0 > area_.u1 || area_.v0 > area_.v1) return Seen::NONE;
+/// Of the pixels of the area, and of some beside them.
+DepthPicture::Depths DepthPicture::depthsOf(const Area& area) const {
   int level = 0;
-  while (((area_.u1 >> level) - (area_.u0 >> level)) > 2 || ((area_.v1 >> level) - (area_.v0 >> level)) > 2) ++level;
+  while (((area.u1 >> level) - (area.u0 >> level)) > 2 || ((area.v1 >> level) - (area.v0 >> level)) > 2) ++level;
   const Level& squares = levels_[level];
-  const float* const last = level == 0 ? squares.nearest.data() : squares.farthest.data();
   // Always three by three, some more than once: processors guess badly how many there are of each cube.
-  const std::int32_t u0 = area_.u0 >> level, u1 = area_.u1 >> level, v0 = area_.v0 >> level, v1 = area_.v1 >> level;
+  const std::int32_t u0 = area.u0 >> level, u1 = area.u1 >> level, v0 = area.v0 >> level, v1 = area.v1 >> level;
   const std::size_t columns[3] = {std::size_t(u0), std::size_t(std::min(u0 + 1, u1)), std::size_t(u1)};
   const std::size_t width = squares.width, rows[3] = {v0 * width, std::min(v0 + 1, v1) * width, v1 * width};
   const auto best = [&](const auto* values, auto start, const auto& better) {
@@ -146,15 +124,63 @@ Seen DepthPicture::look(const OctreeCube& cube) {
     }
     return start;
   };
-  const float most = best(last, -NOWHERE, [](float a, float b) { return a > b; });
-  if (static_cast<double>(most) < nearest) return Seen::NONE;
-  const float least = best(squares.nearest.data(), NOWHERE, [](float a, float b) { return a < b; });
-  const int hole = has_holes_ ? best(squares.hole.data(), std::uint8_t{0}, [](int a, int b) { return a > b; }) : 0;
+  const float* const last = level == 0 ? squares.nearest.data() : squares.farthest.data();
+  Depths depths;
+  depths.nearest = best(squares.nearest.data(), NOWHERE, [](float a, float b) { return a < b; });
+  depths.farthest = best(last, -NOWHERE, [](float a, float b) { return a > b; });
+  if (has_holes_) depths.hole = best(squares.hole.data(), std::uint8_t{0}, [](int a, int b) { return a > b; });
+  return depths;
+}
+
+Seen DepthPicture::look(const OctreeCube& cube) {
+  const Level& all = levels_[0];
+  const double half = 0.5 * cube.size();
+  const Eigen::Vector3d center = Eigen::Vector3d(cube.x + half, cube.y + half, cube.z + half) - geometry_.sensor;
+  const Eigen::Vector3d at = project_ * center, reach = half * spread_;
+  const double margin = DEPTH_ROUNDING * (std::abs(at[2]) + reach[2]);
+  const double nearest = at[2] - reach[2] - margin, farthest = at[2] + reach[2] + margin;
+  const double away2 = center.squaredNorm(), radius = SQRT3 * half;
+  const double out = geometry_.range + radius, in = std::max(0.0, geometry_.range - radius);
+  if (farthest <= 0 || away2 > out * out) return Seen::NONE;
+  const double of_far = 1 / farthest;
+  const double off = geometry_.off_px + ROUNDING_PX;
+  const double side = square_px_ * of_far - 2 * off;
+  const bool is_in_range = away2 <= in * in;
+  if (cube.size() == 1 && nearest > 0 && is_in_range) {
+    // The square that the voxel covers is around its middle: of most voxels the pixel there says enough.
+    const double of_depth = 1 / at[2], u = geometry_.cx + at[0] * of_depth, v = geometry_.cy + at[1] * of_depth;
+    if (u >= 0 && v >= 0 && u < all.width - 1 && v < all.height - 1) {
+      const auto pixel_u = static_cast<std::int32_t>(u + 0.5), pixel_v = static_cast<std::int32_t>(v + 0.5);
+      const float depth = all.nearest[static_cast<std::size_t>(pixel_v) * all.width + pixel_u];
+      if (std::max(std::abs(u - pixel_u), std::abs(v - pixel_v)) <= 0.5 * side &&
+          static_cast<double>(depth) > farthest) {
+        return Seen::ALL;
+      }
+    }
+  }
+  const double of_near = nearest > 0 ? 1 / nearest : std::numeric_limits<double>::infinity();
+  const auto pixels = [&](int axis, double middle, std::int32_t count, std::int32_t& first, std::int32_t& last) {
+    const double lo = at[axis] - reach[axis], hi = at[axis] + reach[axis];
+    const double from = middle + lo * (lo >= 0 ? of_far : of_near) - off;
+    const double to = middle + hi * (hi >= 0 ? of_near : of_far) + off;
+    first = from > 0 ? upOf(std::min<double>(from, count)) : 0;
+    last = to < count - 1 ? (to < 0 ? -1 : static_cast<std::int32_t>(to)) : count - 1;
+    return from >= 0 && to <= count - 1;
+  };
+  const bool is_inside =
+      pixels(0, geometry_.cx, all.width, area_.u0, area_.u1) & pixels(1, geometry_.cy, all.height, area_.v0, area_.v1);
+  if (area_.u0 > area_.u1 || area_.v0 > area_.v1) return Seen::NONE;
+  // What all pixels of the cube above end beyond, those of this one do.
+  const int depth = cube.depth;
+  const bool is_beyond = depth > 0 && beyond_[depth - 1] == cube.code >> 3 * (CUBE_DEPTHS - depth);
+  const Depths depths = is_beyond ? Depths() : depthsOf(area_);
+  if (static_cast<double>(depths.farthest) < nearest) return Seen::NONE;
+  const bool all_beyond = static_cast<double>(depths.nearest) > farthest;
+  beyond_[depth] = all_beyond && depths.hole == 0 ? cube.code >> 3 * (CUBE_DEPTHS - 1 - depth) : NO_CUBE;
   nearest_m_ = nearest;
   farthest_m_ = farthest;
-  const double side = square_px_ / farthest - 2 * off;
-  const bool all_pass = is_inside && nearest > 0 && static_cast<double>(least) > farthest && side >= 1 &&
-                        hole < static_cast<int>(std::min<double>(side, MOST_HOLE)) && away2 <= in * in;
+  const bool all_pass = is_inside && nearest > 0 && all_beyond && side >= 1 &&
+                        depths.hole < static_cast<int>(std::min<double>(side, MOST_HOLE)) && is_in_range;
   if (all_pass) return Seen::ALL;
   const auto inside = [&](int axis, double middle, std::int32_t lo, std::int32_t hi) {
     const double to = at[2] > 0 ? middle + at[axis] / at[2] : 0.5 * (lo + hi);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -48,7 +49,13 @@ class DepthPicture {
   struct Area {
     std::int32_t u0 = 0, u1 = -1, v0 = 0, v1 = -1;
   };
-  static constexpr int LEVELS = 16;
+  struct Depths {
+    float nearest = NOWHERE, farthest = NOWHERE;
+    int hole = 0;  // the largest empty square [px]
+  };
+  static constexpr float NOWHERE = std::numeric_limits<float>::infinity();
+  static constexpr int LEVELS = 16, CUBE_DEPTHS = 17;
+  static constexpr std::uint64_t NO_CUBE = ~std::uint64_t{0};
   static constexpr int MOST_HOLE = 255;
 
   PictureGeometry geometry_;
@@ -59,10 +66,14 @@ class DepthPicture {
   std::array<Level, LEVELS> levels_;
   int level_count_ = 0;
   bool has_holes_ = false;
+  // The last cube of each depth of the octree all of whose pixels end beyond it, as its place among those: none, if
+  // the last of that depth is none.
+  std::array<std::uint64_t, CUBE_DEPTHS> beyond_;
   Area area_;  // of the cube that was looked at last
   double nearest_m_ = 0, farthest_m_ = 0;
   std::int32_t center_u_ = 0, center_v_ = 0;
 
+  Depths depthsOf(const Area& area) const;
   void findHoles();
   void reduce(const Level& from, Level& to, bool is_first) const;
   bool passes(std::int32_t u, std::int32_t v, const OctreeCube& cube) const;

@@ -38,6 +38,10 @@ struct TreeLeaves {
   std::vector<OccupiedLeaf> occupied, free;
   std::vector<OccupiedLeaf> doubtful;  ///< voxels: CloudMap::doubtful()
   std::vector<OccupiedLeaf> found;     ///< voxels that a point of this view fills
+
+  void clear() {
+    for (std::vector<OccupiedLeaf>* list : {&occupied, &free, &doubtful, &found}) list->clear();
+  }
 };
 
 struct UpdateLimits {
@@ -50,25 +54,25 @@ struct UpdateLimits {
 template <class Look>
 class OctreeUpdate {
  public:
-  /// ends: by their words, those that fill within the limits.
+  /// ends: by their words, those that fill within the limits. after: empty; a long list's memory is worth keeping.
   OctreeUpdate(CloudTree& tree, const TreeLeaves& before, const std::vector<std::uint64_t>& ends, Look& look,
-               const UpdateLimits& limits)
+               const UpdateLimits& limits, TreeLeaves& after)
       : tree_(tree),
         ends_(ends),
         look_(look),
         limits_(limits),
         least_(tree.getClampingThresMinLog()),
         most_(tree.getClampingThresMaxLog()),
+        after_(after),
         occupied_(before.occupied, after_.occupied),
         free_(before.free, after_.free),
         doubtful_(before.doubtful, after_.doubtful) {}
 
-  /// The leaves from then on. isFull(): there was no room for all of the view.
-  TreeLeaves run() {
+  /// after: the leaves from then on. isFull(): there was no room for all of the view.
+  void run() {
     path_[0].node = tree_.getRoot();
     visit(0);
     for (Range* list : {&occupied_, &free_, &doubtful_}) list->keepAll();
-    return std::move(after_);
   }
   bool isFull() const { return full_; }
 
@@ -135,7 +139,7 @@ class OctreeUpdate {
   Look& look_;
   const UpdateLimits limits_;
   const float least_, most_;
-  TreeLeaves after_;
+  TreeLeaves& after_;
   Range occupied_, free_, doubtful_;
   std::size_t end_ = 0;  // the next of ends_
   std::array<Step, VOXEL_DEPTH + 1> path_;
@@ -155,6 +159,7 @@ class OctreeUpdate {
 
   void divide(int depth) {
     Step& at = path_[depth];
+    if (at.node) fetchParts(at.node);
     for (unsigned i = 0; i < 8; ++i) {
       Step& part = path_[depth + 1];
       part = Step();
@@ -191,6 +196,7 @@ class OctreeUpdate {
       tree_.updateNodeLogOdds(node, tree_.getProbMissLog());
       return list(cube, node);
     }
+    fetchParts(node);
     for (unsigned i = 0; i < 8; ++i) {
       const bool exists = tree_.nodeChildExists(node, i);
       if (exists || !full_) missTree(exists ? tree_.getNodeChild(node, i) : make(node, i), cube.child(i));
@@ -247,6 +253,13 @@ class OctreeUpdate {
   Node* make(Node* above, unsigned index) {
     full_ = full_ || tree_.size() > limits_.nodes;
     return tree_.createNodeChild(above, index);
+  }
+
+  /// They lie anywhere, and each will be asked.
+  void fetchParts(const Node* node) const {
+    for (unsigned i = 0; i < 8; ++i) {
+      if (tree_.nodeChildExists(node, i)) __builtin_prefetch(tree_.getNodeChild(node, i));
+    }
   }
 
   void list(const OctreeCube& cube, const Node* leaf) { (tree_.isNodeOccupied(leaf) ? occupied_ : free_).list(cube); }

@@ -269,6 +269,7 @@ TEST(CloudMapRays, OfAPictureOfManyPixelsAVoxel) {
 TEST(CloudMapRays, OfAPictureOfFewPixelsAVoxel) {
   for (std::uint32_t seed = 0; seed < 2; ++seed) holdPictures(seed, 0.02, false, false, 3);
 }
+TEST(CloudMapRays, OfAPictureOfVoxelsBetweenPixels) { holdPictures(2, 0.01, false, false, 1); }
 TEST(CloudMapRays, OfACameraThatStandsStill) { EXPECT_GT(holdPictures(5, 0.05, false, true, 10), 20u) << "in doubt"; }
 TEST(CloudMapRays, OfPointsInRows) {
   for (std::uint32_t seed = 0; seed < 4; ++seed) holdPictures(seed, 0.07, true, false);
