@@ -60,6 +60,7 @@ class BagCheck {
     std::vector<Record> infos;
     std::optional<std::set<std::uint32_t>> messages;
     for (std::uint64_t at = first.end; left > 0;) {
+      if (at < index_at && areZeros(at, index_at)) at = index_at;
       const Record record = recordAt(at, size_);
       in_index = in_index || at == index_at;
       left -= in_index;
@@ -102,6 +103,12 @@ class BagCheck {
     std::string text(size, '\0');
     readTo(text.data(), at, size);
     return text;
+  }
+  /// What rosbag reindex of ros_comm 1.15.9 (Debian 11) leaves where it cut a bag.
+  bool areZeros(std::uint64_t at, std::uint64_t end) {
+    if (end > size_ || end - at < 4 || numberAt(at) != 0) return false;
+    const std::string text = textAt(at, end - at);
+    return text.find_first_not_of('\0') == std::string::npos;
   }
   std::uint32_t numberAt(std::uint64_t at) {
     std::uint32_t number = 0;

@@ -74,6 +74,20 @@ class DamagedBagTest(FolderTestCase):
         self.assertEqual(run('rosbag', 'reindex', half).returncode, 0)
         self.assertEqual(self.analyze(half).returncode, 0, 'the remedy')
 
+    def test_zeros_where_an_older_reindex_cut_it(self):
+        """ros_comm 1.15.9 goes on behind where it cut."""
+        half = self.cut(self.whole.stat().st_size // 2)
+        self.assertEqual(run('rosbag', 'reindex', '--force', half).returncode, 0)
+        read = bytearray(half.read_bytes())
+        at = read.index(b'index_pos=') + 10
+        index = struct.unpack_from('<Q', read, at)[0]
+        for zeros, wrong, expected in ((0, b'', 0), (2000, b'', 0), (3, b'', 1), (2000, b'x', 1)):
+            with self.subTest(zeros=zeros, wrong=wrong):
+                struct.pack_into('<Q', read, at, index + zeros + len(wrong))
+                half.write_bytes(read[:index] + zeros * b'\0' + wrong + read[index:])
+                ran = self.analyze(half)
+                self.assertEqual(ran.returncode, expected, ran.stderr)
+
     def test_lengths_and_places_that_are_wrong(self):
         """rosbag trusts them: it read past its buffers, and was ended by a signal."""
         whole = self.whole.read_bytes()
