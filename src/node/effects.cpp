@@ -90,17 +90,22 @@ bool EffectTracker::takeNewPlan() {
   return true;
 }
 
-deformable_ccd::EffectArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
-  deformable_ccd::EffectArray out;
+diagnostic_msgs::DiagnosticArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
+  diagnostic_msgs::DiagnosticArray out;
   out.header.stamp = stamp;
   out.header.frame_id = frame;
   for (const EffectDecision& decision : plan_.decisions()) {
-    deformable_ccd::EffectState state;
+    diagnostic_msgs::DiagnosticStatus state;
     state.name = decision.name;
-    state.setting = toString(decision.setting);
-    state.running = decision.running;
-    state.reason = decision.reason;
-    out.effects.push_back(state);
+    state.message = decision.reason;
+    const auto add = [&](const char* key, const std::string& value) {
+      state.values.emplace_back();
+      state.values.back().key = key;
+      state.values.back().value = value;
+    };
+    add("setting", toString(decision.setting));
+    add("running", decision.running ? "true" : "false");
+    out.status.push_back(state);
   }
   return out;
 }
