@@ -114,7 +114,6 @@ class OwnVoxelFinder {
   RigidShapes shapes_;                         // of bodies that have been asked about
   std::vector<OccupiedLeaf> seen_;             // of the last map: in doubt for its maker
   SeenAlone seen_alone_;                       // of the last map
-  std::weak_ptr<const VoxelSurface> reduced_;  // of the map before, if it is still there
   std::uint64_t number_ = 0;                   // ObstacleMap::number of the last map
   std::string why_lost_;                       // why one was lost since it, as far as somebody said so
   std::string gap_;                            // before the map that put some voxel in doubt; empty: none

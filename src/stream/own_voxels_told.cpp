@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/next_surface.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "stream/own_voxels.h"
@@ -80,13 +79,9 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   map.own.voxels = share(std::move(voxels));
   describe(bodies, map.known != nullptr, gap_, map.own);
   if (!without.empty()) {
-    const auto last = reduced_.lock();
-    const std::shared_ptr<const VoxelSurface> given = map.surface;
-    map.surface =
-        nextSurface(resolution_m, leavesWithout(VoxelSurface::Impl::of(*given).tree, VoxelTree(without), sure.leaves()),
-                    last ? *last : *given);
+    map.surface = VoxelSurface::build(
+        resolution_m, leavesWithout(VoxelSurface::Impl::of(*map.surface).tree, VoxelTree(without), sure.leaves()));
   }
-  reduced_ = map.surface;
   return map;
 }
 
