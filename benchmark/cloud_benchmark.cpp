@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/cloud_map.h"
-#include "base/next_surface.h"
 #include "support/seen_scene.h"
 #include "support/timing.h"
 
@@ -145,10 +144,10 @@ Case lidarCase(int frames) {
 }
 
 void setModel(octomap::OcTree& tree, const CloudMapOptions& options) {
-  tree.setProbHit(options.hit);
-  tree.setProbMiss(options.miss);
-  tree.setClampingThresMin(options.min);
-  tree.setClampingThresMax(options.max);
+  tree.setProbHit(options.HIT);
+  tree.setProbMiss(options.MISS);
+  tree.setClampingThresMin(options.MIN);
+  tree.setClampingThresMax(options.MAX);
 }
 
 /// OctomapServer::insertScan() for the points that are no ground, with its defaults.
@@ -181,8 +180,7 @@ void serve(octomap::OcTree& tree, const Case& c, const Message& message) {
 }
 
 /// The message's bytes to the surface after them.
-std::shared_ptr<const VoxelSurface> see(CloudMap& map, const Case& c, const Message& message,
-                                        const std::shared_ptr<const VoxelSurface>& before) {
+std::shared_ptr<const VoxelSurface> see(CloudMap& map, const Case& c, const Message& message) {
   const std::vector<float> values = valuesOf(message, c.form);
   const SensorView view = c.form == Form::DEPTHS ? test::viewOf(message.pose, values, c.lens, message.width)
                                                  : test::viewOf(message.pose, values, message.width);
@@ -192,8 +190,7 @@ std::shared_ptr<const VoxelSurface> see(CloudMap& map, const Case& c, const Mess
   OctomapLimits limits;
   limits.free_leaves = false;
   DecodedOctomap leaves = map.leaves(limits);
-  return before ? nextSurface(leaves.resolution_m, std::move(leaves.occupied), *before)
-                : VoxelSurface::build(leaves.resolution_m, std::move(leaves.occupied));
+  return VoxelSurface::build(leaves.resolution_m, std::move(leaves.occupied));
 }
 
 /// Means over the second half of the messages, when the map knows the scene; of each run.
@@ -208,7 +205,7 @@ nlohmann::json measure(const Case& c, int repeat, int repeat_server) {
       double ms = 0;
       for (std::size_t i = 0; i < c.messages.size(); ++i) {
         const double start = threadMs();
-        surface = see(map, c, c.messages[i], surface);
+        surface = see(map, c, c.messages[i]);
         if (i >= first) ms += threadMs() - start;
       }
       voxels = surface->leafCount();

@@ -136,8 +136,7 @@ def margins_page(table):
     rows = [line.strip("| ").split(" | ") for line in table if line.startswith("| `")]
     held = [float(row[3]) for row in rows]
     return ["", "## Margins", "",
-            "Each margin of `include/dccd/tolerances.h` covers rounding, and its derivation stands beside the code. `scripts/test --long --only margins` cuts one",
-            "at a time and asks exact arithmetic about inputs that aim at its bound. Of %d none goes wrong with the whole margin. With a tenth of it %d do: the others"
+            "`scripts/test --long --only margins` cuts one of the %d margins at a time. With a tenth of it %d go wrong: the others"
             % (len(rows), sum(row[2] != "0" for row in rows)),
             "add up dozens of roundings, serve several quantities, or cover underflow. The largest part of a margin with which an input goes wrong is %g (%s)."
             % (max(held), " and ".join(row[0] for row, part in zip(rows, held) if part == max(held)))]

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <string>
 
+#include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/State.h>
-#include <deformable_ccd/TimeToContact.h>
 #include <ros/ros.h>
 #include <std_msgs/Bool.h>
 
@@ -38,7 +38,7 @@ class StopTheArm {
     if (newer) state_at_ = ros::SteadyTime::now();
   }
 
-  void onPrediction(const deformable_ccd::TimeToContact& message) {
+  void onPrediction(const deformable_ccd::FirstContact& message) {
     answered_ = message.answered;
     // Beyond the horizon nothing is known: it counts as the time of a contact.
     contact_in_s_ = message.contact ? std::min(message.seconds, message.horizon) : message.horizon;

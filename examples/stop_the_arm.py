@@ -8,7 +8,7 @@ and what lasts, is no reason to stop. This is no safety function.
 import time
 
 import rospy
-from deformable_ccd.msg import State, TimeToContact
+from deformable_ccd.msg import FirstContact, State
 from std_msgs.msg import Bool
 
 
@@ -63,7 +63,7 @@ class StopTheArm:
         self.told = None
         self.stop = rospy.Publisher('~stop', Bool, queue_size=1, latch=True)
         rospy.Subscriber(monitor + '/state', State, lambda m: self.rule.on_state(time.monotonic(), m), queue_size=1)
-        rospy.Subscriber(monitor + '/time_to_contact', TimeToContact,
+        rospy.Subscriber(monitor + '/time_to_contact', FirstContact,
                          lambda m: self.rule.on_prediction(time.monotonic(), m), queue_size=1)
 
     def spin(self):

@@ -208,7 +208,7 @@ SensorView CloudMapping::readCloudOf(const CloudMessage& message, Reading& readi
   } else if (sensor.empty() && frame == frame_) {
     throw WireError("it comes in the map's own frame '" + frame_ +
                     "', which does not tell where the sensor was, so that it fills and clears nothing; name "
-                    "the sensor's frame by sensor_frame in obstacle_cloud_topics, also where that is this one, or send "
+                    "the sensor's frame by sensor_frame in obstacle_cloud_topic, also where that is this one, or send "
                     "the cloud as the sensor made it");
   } else {
     pointsInto(cloud, numbers_);
@@ -324,8 +324,7 @@ void CloudMapping::refuse(std::size_t source, StampNs receipt_ns, const std::str
   view.receipt_ns = receipt_ns;
 }
 
-LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<bool()>& may_wait,
-                            const VoxelSurface* before) {
+LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<bool()>& may_wait) {
   const std::int64_t start_ns = steadyNs();
   LoadedMap map;
   map.frame_id = frame_;
@@ -333,7 +332,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
   Reading reading{map, {message.source, {}}, may_wait};
   bool is_seen = false;
   forgetRefused(message.receipt_ns);
-  loadMap(config_, &memory_, before, map, [&](const OctomapLimits& limits) {
+  loadMap(config_, &memory_, map, [&](const OctomapLimits& limits) {
     SensorView seen = read(message, reading);
     const auto known = views_.find(reading.view);
     seen.clears = !(message.is_behind && known != views_.end() && known->second.fills_next);

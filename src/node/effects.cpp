@@ -31,12 +31,11 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   scene_.map_source = config.mapName();
   if (!map_source.empty()) scene_.map_source = map_source;
   scene_.map_named = config.octomap_topic_named || config.cloud_named;
-  if (config.takesClouds())
-    scene_.map_parameter = config.clouds.size() == 1 ? "obstacle_cloud_topic" : "obstacle_cloud_topics";
+  if (config.takesClouds()) scene_.map_parameter = "obstacle_cloud_topic";
   scene_.map_seen = config.takesMapFileAlone();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
   promised_ = scene_.clearance_wanted = config.promises();
-  scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
+  scene_.unknown_space_counts = config.unknown_box.has_value();
   plan_ = EffectPlan(scene_, settings_);
 }
 
@@ -91,17 +90,22 @@ bool EffectTracker::takeNewPlan() {
   return true;
 }
 
-deformable_ccd::EffectArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
-  deformable_ccd::EffectArray out;
+diagnostic_msgs::DiagnosticArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
+  diagnostic_msgs::DiagnosticArray out;
   out.header.stamp = stamp;
   out.header.frame_id = frame;
   for (const EffectDecision& decision : plan_.decisions()) {
-    deformable_ccd::EffectState state;
+    diagnostic_msgs::DiagnosticStatus state;
     state.name = decision.name;
-    state.setting = toString(decision.setting);
-    state.running = decision.running;
-    state.reason = decision.reason;
-    out.effects.push_back(state);
+    state.message = decision.reason;
+    const auto add = [&](const char* key, const std::string& value) {
+      state.values.emplace_back();
+      state.values.back().key = key;
+      state.values.back().value = value;
+    };
+    add("setting", toString(decision.setting));
+    add("running", decision.running ? "true" : "false");
+    out.status.push_back(state);
   }
   return out;
 }

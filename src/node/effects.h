@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <deformable_ccd/EffectArray.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 
 #include "config/monitor_config.h"
 
@@ -40,7 +40,8 @@ class EffectTracker {
 
   const EffectPlan& plan() const { return plan_; }
   std::vector<std::string> lines() const { return plan_.lines(); }
-  deformable_ccd::EffectArray message(const ros::Time& stamp, const std::string& frame) const;
+  /// Of each effect its name, the reason, and as values its setting and whether it is running.
+  diagnostic_msgs::DiagnosticArray message(const ros::Time& stamp, const std::string& frame) const;
 
  private:
   EffectScene scene_;

@@ -187,16 +187,22 @@ const deformable_ccd::ContactArray& fillContactArray(const Outcome& outcome, con
   return out;
 }
 
-deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
-                                            const std::string& frame) {
+namespace {
+
+deformable_ccd::FirstContact firstContact(const Outcome& outcome, StampNs stamp_ns, double horizon_s,
+                                          const std::vector<Body>& bodies, const std::string& frame) {
   deformable_ccd::FirstContact out;
-  fillHead(outcome, outcome.stamp_ns, frame, out);
+  fillHead(outcome, stamp_ns, frame, out);
   const double toc = earliestNewToc(outcome);
   out.contact = std::isfinite(toc);
   out.pairs = toPairContacts(outcome, bodies);
   out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(outcome));
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
-  out.toc = out.seconds_from_start = plottable(toc);
+  out.horizon = horizon_s;
+  out.toc = plottable(toc);
+  out.seconds = plottable(toc * horizon_s);
+  // Rounded to the nearest it could be late.
+  if (out.contact && std::fma(toc, horizon_s, -out.seconds) < 0) out.seconds = std::nextafter(out.seconds, 0);
   const Contact* first = nullptr;
   const std::vector<NewContact> found = newContacts(outcome);
   for (const NewContact& one : found) {
@@ -205,12 +211,21 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
     if (!first || (certain && !out.certain)) first = &one.contact;
     out.certain |= certain;
   }
-  if (out.contact) {
-    out.time_of_contact = toRosTime(outcome.stampBefore(toc));
-    out.seconds_from_start = toc * outcome.duration_s();
-  }
+  if (out.contact) out.time_of_contact = toRosTime(outcome.stampBefore(toc));
   out.summary = firstContactInWords(outcome, toc, first, bodies);
   return out;
+}
+
+}  // namespace
+
+deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
+                                            const std::string& frame) {
+  return firstContact(outcome, outcome.stamp_ns, outcome.duration_s(), bodies, frame);
+}
+
+deformable_ccd::FirstContact toTimeToContact(const Outcome& prediction, double horizon_s,
+                                             const std::vector<Body>& bodies, const std::string& frame) {
+  return firstContact(prediction, prediction.start_ns, horizon_s, bodies, frame);
 }
 
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) {
@@ -289,22 +304,6 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.clouds_only_filled = context.clouds_only_filled;
   out.points_no_measurement = context.points_no_measurement;
   out.parameter_hash = context.parameter_hash;
-  return out;
-}
-
-deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
-                                              const std::vector<Body>& bodies, const std::string& frame) {
-  deformable_ccd::TimeToContact out;
-  fillHead(prediction, prediction.start_ns, frame, out);
-  out.horizon = horizon_s;
-  const double toc = earliestNewToc(prediction);
-  out.contact = std::isfinite(toc);
-  out.pairs = toPairContacts(prediction, bodies);
-  out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(prediction));
-  out.expected_contacts = static_cast<std::uint32_t>(prediction.counts.expected);
-  out.seconds = plottable(toc * horizon_s);
-  // Rounded to the nearest it could be late.
-  if (out.contact && std::fma(toc, horizon_s, -out.seconds) < 0) out.seconds = std::nextafter(out.seconds, 0);
   return out;
 }
 

@@ -9,7 +9,6 @@
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
-#include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
 #include "dccd/monitor_extras.h"
@@ -85,7 +84,7 @@ double mapAge(const Outcome& outcome);
 /// The message of the package, not StepStats.
 deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
 /// From a prediction (Monitor::predict) over horizon_s.
-deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
-                                              const std::vector<Body>& bodies, const std::string& frame);
+deformable_ccd::FirstContact toTimeToContact(const Outcome& prediction, double horizon_s,
+                                             const std::vector<Body>& bodies, const std::string& frame);
 
 }  // namespace dccd

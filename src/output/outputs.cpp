@@ -19,10 +19,10 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", TOPIC_QUEUE);
   stats_ = node.advertise<deformable_ccd::StepStats>("stats", TOPIC_QUEUE);
   markers_ = node.advertise<visualization_msgs::MarkerArray>("markers", 2);
-  effects_ = node.advertise<deformable_ccd::EffectArray>("effects", 1, true);
+  effects_ = node.advertise<diagnostic_msgs::DiagnosticArray>("effects", 1, true);
   if (config.monitor.look_ahead_s > 0) {
     predicted_ = node.advertise<deformable_ccd::ContactArray>("predicted_contacts", TOPIC_QUEUE);
-    time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", TOPIC_QUEUE);
+    time_to_contact_ = node.advertise<deformable_ccd::FirstContact>("time_to_contact", TOPIC_QUEUE);
   }
   if (config.monitor.detector.patches) {
     patches_ = node.advertise<deformable_ccd::PatchArray>("patches", TOPIC_QUEUE);
@@ -101,7 +101,7 @@ void Outputs::publishLimits(const std::function<deformable_ccd::Limits()>& make)
 }
 void Outputs::publishAlongPath(const deformable_ccd::AlongPath& message) { along_path_.publish(message); }
 
-void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }
+void Outputs::publishEffects(const diagnostic_msgs::DiagnosticArray& effects) { effects_.publish(effects); }
 
 void Outputs::publishNothing(const std::string& frame) {
   // Of an outcome without an answer all that is shown is that what was there before is gone.

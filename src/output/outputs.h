@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <deformable_ccd/EffectArray.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/node_handle.h>
 
 #include "config/monitor_config.h"
@@ -44,7 +44,7 @@ class Outputs {
   void publishAlongPath(const deformable_ccd::AlongPath& message);
   /// Built only if somebody listens, and where it is asked for.
   void publishLimits(const std::function<deformable_ccd::Limits()>& make);
-  void publishEffects(const deformable_ccd::EffectArray& effects);
+  void publishEffects(const diagnostic_msgs::DiagnosticArray& effects);
   /// Latched. Only where some body separates.
   /// Nothing is shown any more: after a reset or when disabled. An empty frame: nothing was shown yet.
   void publishNothing(const std::string& frame);

@@ -87,9 +87,8 @@ class MapsTest(AttackTest):
         self.assert_quiet(time.monotonic() - begin, 4)
 
     def test_the_unknown_between_known_voxels(self):
-        box = [-3, -3, -3, 3, 3, 3]
-        rospy.set_param('/unknown/unknown_box', box)
-        self.start('unknown', unknown_space='occupied')
+        rospy.set_param('/unknown/unknown_box', [-3, -3, -3, 3, 3, 3])
+        self.start('unknown')
         for depth in (3, 6, 4, 7):
             data = checkerboard(depth)
             self.give(data)

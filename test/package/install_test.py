@@ -26,7 +26,7 @@ rosrun deformable_ccd analyze_bag scene.bag --report report --quiet
 [ -s report/report.html ]
 grep -q '"headline": *"First contact' report/report.json
 rosmsg show deformable_ccd/ContactArray >/dev/null
-python3 -c 'from deformable_ccd.msg import ContactArray, TimeToContact'
+python3 -c 'from deformable_ccd.msg import ContactArray, FirstContact'
 python3 "$share/examples/python/two_frames.py" | grep -q '5 contacts, starts CLEAR'
 [ -e "$share/examples/stop_the_arm.py" ] && [ -e "$share/config/rviz/monitor.rviz" ]
 rospack plugins --attrib=plugin nodelet | grep -q "deformable_ccd $INSTALLED"

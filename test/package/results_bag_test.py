@@ -83,7 +83,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
         # A bag has no ~intended, whose answer that is.
         self.assertEqual({OWN + topic for topic in topics} - set(messages), {OWN + 'along_path'})
         effects = messages[OWN + 'effects']
-        self.assertEqual({e.name for e in effects[-1].effects if e.running} & {'look_ahead', 'minimum_separation'},
+        self.assertEqual({e.name for e in effects[-1].status if {v.key: v.value for v in e.values}['running'] == 'true'} & {'look_ahead', 'minimum_separation'},
                          {'look_ahead', 'minimum_separation'})
         self.assertLess(len(effects), 10, 'when the plan changes, and not in each step')
         self.assertGreater(max(m.left_out_met for m in messages[OWN + 'stats']), 0)

@@ -1,7 +1,6 @@
 // Effects through the live node: separations of bodies and of pairs, and distances.
 #include <deformable_ccd/ClearanceArray.h>
 #include <deformable_ccd/ContactArray.h>
-#include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/State.h>
 
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
+#include "ros/support/effects.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
@@ -34,16 +34,10 @@ struct Felt : MonitorTest {
 
 // The first case of this monitor: it has not had any frame yet.
 TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndStaysWhileNothingChanges) {
-  Probe<deformable_ccd::EffectArray> effects(node, "/felt/effects");
+  Probe<diagnostic_msgs::DiagnosticArray> effects(node, "/felt/effects");
   ASSERT_TRUE(waitUntil([&] { return effects.count() > 0; })) << "before any frame";
   const std::size_t before = effects.count();
-  const auto reasonOf = [&](const std::string& name) {
-    for (const deformable_ccd::EffectState& effect : effects.last().effects) {
-      if (effect.name == name) return effect.reason;
-    }
-    return std::string();
-  };
-  EXPECT_EQ(reasonOf("minimum_separation"), "contacts are reported from 0.12 m");
+  EXPECT_EQ(effectIn(effects.last(), "minimum_separation").reason, "contacts are reported from 0.12 m");
   sendBoth(1, 10);
   sendBoth(0.9, 10.1);
   for (int i = 0; i < 5; ++i) sendBoth(0.9, 10.2 + 0.1 * i);
@@ -64,15 +58,10 @@ struct Apart : MonitorTest {
   Apart() : MonitorTest("/apart") {}
   ros::Publisher mesh = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/apart/mesh");
   ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/apart/octomap", true);
-  Probe<deformable_ccd::EffectArray> effects{node, "/apart/effects"};
+  Probe<diagnostic_msgs::DiagnosticArray> effects{node, "/apart/effects"};
   Probe<deformable_ccd::State> state{node, "/apart/state"};
 
-  bool running() {
-    for (const deformable_ccd::EffectState& effect : effects.last().effects) {
-      if (effect.name == "clearance") return effect.running;
-    }
-    return false;
-  }
+  bool running() { return effectIn(effects.last(), "clearance").running; }
   std::uint64_t clearancesAsked() {
     for (const deformable_ccd::StageStats& row : stats.last().stages) {
       if (row.name == "clearance") return row.count_in;

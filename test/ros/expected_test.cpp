@@ -1,11 +1,10 @@
 // Expected contacts through the live node: no alarm in their phase, but found, listed, counted, marked and said.
-#include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/Named.h>
 #include <deformable_ccd/PatchEvent.h>
 #include <deformable_ccd/State.h>
-#include <deformable_ccd/TimeToContact.h>
 
+#include "ros/support/effects.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
@@ -54,20 +53,14 @@ struct Pressing : MonitorTest {
 
 // The first case of this monitor: nobody has listened to its predictions.
 TEST_F(Pressing, NoEffectIsOnThatNobodyListensTo) {
-  Probe<deformable_ccd::EffectArray> effects(node, "/pressing/effects");
-  const auto lookAhead = [&] {
-    deformable_ccd::EffectState found;
-    for (const auto& effect : effects.last().effects) {
-      if (effect.name == "look_ahead") found = effect;
-    }
-    return found;
-  };
+  Probe<diagnostic_msgs::DiagnosticArray> effects(node, "/pressing/effects");
+  const auto lookAhead = [&] { return effectIn(effects.last(), "look_ahead"); };
   ASSERT_TRUE(waitUntil([&] { return effects.count() > 0; }));
   EXPECT_FALSE(lookAhead().running);
   EXPECT_EQ(lookAhead().reason, "nobody subscribes to predictions");
   {
-    Probe<deformable_ccd::TimeToContact> prediction(node, "/pressing/time_to_contact");
-    EXPECT_TRUE(waitUntil([&] { return static_cast<bool>(lookAhead().running); })) << lookAhead().reason;
+    Probe<deformable_ccd::FirstContact> prediction(node, "/pressing/time_to_contact");
+    EXPECT_TRUE(waitUntil([&] { return lookAhead().running; })) << lookAhead().reason;
   }
   EXPECT_TRUE(waitUntil([&] { return !lookAhead().running; })) << "the subscriber has gone";
 }
@@ -98,7 +91,7 @@ TEST_F(Pressing, InItsPhaseItIsFoundListedCountedMarkedAndNoAlarm) {
 
 TEST_F(Pressing, APhaseThatEndsIsAnAlarmForWhatGoesOnTouching) {
   Probe<deformable_ccd::PatchEvent> events(node, "/pressing/events");
-  Probe<deformable_ccd::TimeToContact> prediction(node, "/pressing/time_to_contact");
+  Probe<deformable_ccd::FirstContact> prediction(node, "/pressing/time_to_contact");
   EXPECT_TRUE(setPhase("carry").success);
   move(0.1, -0.01, 220);
   EXPECT_EQ(said.touching, State::EXPECTED) << said.reason;
@@ -112,7 +105,7 @@ TEST_F(Pressing, APhaseThatEndsIsAnAlarmForWhatGoesOnTouching) {
   EXPECT_TRUE(setPhase("").success);
   const auto alarm = stay(220.3);
   EXPECT_TRUE(alarm.contact);
-  EXPECT_EQ(alarm.seconds_from_start, 0);
+  EXPECT_EQ(alarm.seconds, 0);
   EXPECT_EQ(alarm.time_of_contact, ros::Time(220.2));
   EXPECT_NE(alarm.summary.find("surfaces cross since before the step began"), std::string::npos) << alarm.summary;
   EXPECT_EQ(said.touching, State::NEW) << said.reason;

@@ -1,12 +1,12 @@
 // What a launch argument or a parameter names is called for: a named map that does not come, or that is refused, is
 // NO_MAP, at WARN in diagnostics and never clear. What nobody named is not missed.
 #include "ros/support/bytes_of.h"
+#include "ros/support/effects.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 #include <algorithm>
 
-#include <deformable_ccd/EffectArray.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <topic_tools/shape_shifter.h>
 
@@ -50,11 +50,8 @@ struct Inputs : MonitorTest {
     return diagnosis();
   }
   std::string octomapsReason() {
-    Probe<deformable_ccd::EffectArray> effects(node, name_ + "/effects");
-    for (const deformable_ccd::EffectState& effect : effects.after(0).effects) {
-      if (effect.name == "octomap") return effect.reason;
-    }
-    return "";
+    Probe<diagnostic_msgs::DiagnosticArray> effects(node, name_ + "/effects");
+    return effectIn(effects.after(0), "octomap").reason;
   }
 
   void expectNoMap(const std::string& topic) {

@@ -4,7 +4,6 @@
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
-#include <deformable_ccd/TimeToContact.h>
 
 #include <algorithm>
 #include <cmath>
@@ -58,7 +57,7 @@ TEST_F(Plain, MeshStampedKnownTime) {
   EXPECT_NEAR(contact.point.z, 0, 1e-6);
   EXPECT_NEAR(contact.approach_speed, 40, 1e-3) << "m/s, not m per step";
   ASSERT_TRUE(waitUntil([&] { return first.count() > 0 && first.last().contact; }));
-  EXPECT_NEAR(first.last().seconds_from_start, 0.025, 1e-6);
+  EXPECT_NEAR(first.last().seconds, 0.025, 1e-6);
   EXPECT_EQ(first.last().summary.rfind("contact 0.025000 s into the step: ", 0), 0u) << first.last().summary;
   expectAddsUp();
 }
@@ -153,22 +152,22 @@ TEST_F(Plain, FramesWaitForMovingTransforms) {
 }
 
 TEST_F(Plain, LookAheadPredictsWhatComes) {
-  Probe<deformable_ccd::TimeToContact> ahead(node, "/plain/time_to_contact");
+  Probe<deformable_ccd::FirstContact> ahead(node, "/plain/time_to_contact");
   Probe<deformable_ccd::ContactArray> predicted(node, "/plain/predicted_contacts");
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(2), 10));
   send(publisher, meshStamped(tipAbove(1.5), 10.1));
   const auto told = [&](double stamp_s, std::uint8_t status) {
-    deformable_ccd::TimeToContact found;
+    deformable_ccd::FirstContact found;
     EXPECT_TRUE(waitUntil([&] {
-      for (const deformable_ccd::TimeToContact& m : ahead.all()) {
+      for (const deformable_ccd::FirstContact& m : ahead.all()) {
         if (m.header.stamp == ros::Time(stamp_s) && m.status == status) found = m;
       }
       return found.header.stamp == ros::Time(stamp_s);
     })) << stamp_s;
     return found;
   };
-  const deformable_ccd::TimeToContact time = told(10.1, deformable_ccd::ContactArray::OK);
+  const deformable_ccd::FirstContact time = told(10.1, deformable_ccd::ContactArray::OK);
   ASSERT_TRUE(time.answered);
   EXPECT_TRUE(time.contact);
   EXPECT_NEAR(time.seconds, 0.3, 1e-6);

@@ -1,6 +1,6 @@
 // examples/stop_the_arm in C++ and Python: it says stop in time, and whenever it cannot know.
+#include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/State.h>
-#include <deformable_ccd/TimeToContact.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 #include <std_msgs/Bool.h>
@@ -22,7 +22,7 @@ class PlayedMonitor {
  public:
   explicit PlayedMonitor(ros::NodeHandle& node)
       : state_(advertiseAndWait<deformable_ccd::State>(node, "/played/state", true, 2)),
-        prediction_(advertiseAndWait<deformable_ccd::TimeToContact>(node, "/played/time_to_contact", false, 2)) {}
+        prediction_(advertiseAndWait<deformable_ccd::FirstContact>(node, "/played/time_to_contact", false, 2)) {}
 
   bool silent = false, proved = true, answered = true, goes_on = true;
   std::uint8_t touching = deformable_ccd::State::NONE;
@@ -38,7 +38,7 @@ class PlayedMonitor {
     state.holds_until = holds_until_;
     state_.publish(state);
     if (!predicts) return;
-    deformable_ccd::TimeToContact time;
+    deformable_ccd::FirstContact time;
     time.answered = answered;
     time.contact = contact_in_s < horizon_s;
     time.seconds = contact_in_s;

@@ -177,7 +177,7 @@ TEST(Plots, WhatIsNotThereIsNotInfinite) {
   ASSERT_EQ(nothing.earliest_unexpected_toc, std::numeric_limits<double>::infinity());
   nothing.earliest_toc = std::numeric_limits<double>::infinity();
   const auto first = toFirstContact(nothing, nothing.step->bodies, "world");
-  EXPECT_TRUE(std::isnan(first.toc) && std::isnan(first.seconds_from_start));
+  EXPECT_TRUE(std::isnan(first.toc) && std::isnan(first.seconds));
   EXPECT_TRUE(std::isnan(toTimeToContact(nothing, 2, nothing.step->bodies, "world").seconds));
   EXPECT_TRUE(std::isnan(toStepStats(nothing, {}, "world").earliest_toc));
   EXPECT_TRUE(std::isnan(toTimeToContact(Outcome(), 2, {}, "world").seconds)) << "no answer";
