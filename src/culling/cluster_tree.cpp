@@ -127,6 +127,12 @@ void ClusterTree::refitGroups(std::size_t first_group, std::size_t last_group) {
   for (std::size_t g = first_group; g < last_group; ++g) made_[g].store(WAITS, std::memory_order_relaxed);
 }
 
+void ClusterTree::releaseLeaves(const std::uint16_t* records) {
+  letLeavesWait(true, records);
+  for (std::atomic<std::uint8_t>& made : made_) made.store(WAITS, std::memory_order_relaxed);
+  giveBack(levels_[0].soa.data(), levels_[0].groups * SOA_SIZE * sizeof(std::uint16_t));
+}
+
 void ClusterTree::makeLeaves(std::size_t group) const {
   std::atomic<std::uint8_t>& made = made_[group];
   std::uint8_t waits = WAITS;

@@ -67,6 +67,8 @@ class ClusterTree {
   /// those groups that are asked for, from the same records, without margins.
   void letLeavesWait(bool wait, const std::uint16_t* records);
   void refitGroups(std::size_t first_group, std::size_t last_group);
+  /// Of what was refitted from these records without margins, leaves wait again, and take no memory until then.
+  void releaseLeaves(const std::uint16_t* records);
   void refitUpper();
   /// Before a group of leaves is looked at. Of any number of threads one makes them, and the others wait for it.
   void needLeaves(std::size_t group) const {

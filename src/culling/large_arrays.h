@@ -5,9 +5,11 @@
 #include <hwy/aligned_allocator.h>
 #ifdef __linux__
 #include <sys/mman.h>
+#include <unistd.h>
 #endif
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 
@@ -32,6 +34,16 @@ hwy::AlignedFreeUniquePtr<T[]> makeLarge(std::size_t n) {
       n, allocate, [](void*, void* memory) { std::free(memory); }, nullptr);
   if (!array) throw std::bad_alloc();
   return array;
+}
+
+/// The system has the memory until it is written again; what was in it is lost.
+inline void giveBack([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes) {
+#ifdef MADV_DONTNEED
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const auto begin = reinterpret_cast<std::uintptr_t>(memory), first = (begin + page - 1) / page * page;
+  const std::uintptr_t last = (begin + bytes) / page * page;
+  if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
+#endif
 }
 
 }  // namespace dccd

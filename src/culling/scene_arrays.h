@@ -33,6 +33,9 @@ struct Extent {
   bool is_finite = false;  ///< all of them are
 };
 
+/// What has stood for so many steps is taken to stay, and what is soon made again of it is given back.
+constexpr unsigned RESTS = 16;
+
 /// One body: where its elements are in the scene's arrays.
 struct SceneBody {
   Body setup;              ///< as it was when it was set; where it is comes with each step
@@ -48,6 +51,7 @@ struct SceneBody {
   bool uncertain = false;  ///< some vertex has an uncertainty radius above 0 in this step
   bool unchanged = false;  ///< every vertex is at both ends where it was in the step before, bit for bit
   bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
+  unsigned rests = 0;      ///< steps on end in which it stood where it stood before; no more than RESTS + 1
   bool stale = false;      ///< its records and bounds are not those of its vertices
   bool far = false;        ///< it comes near no other body that it is tested against, and has no bounds in this step
   bool passed_by = false;  ///< it is far, and nothing else is asked of it: its vertices are not those of the step

@@ -331,6 +331,9 @@ void SceneArrays::endRecord(bool any_kept, bool may_scale) {
   setRange(any_kept && !scaled);
   for (SceneBody& body : bodies_) {
     if (!body.kept) setMargin(body, body.reach_m, body.margin);
+    body.rests = body.unchanged && isStill(body) ? std::min(body.rests + 1, RESTS + 1) : 0;
+    if (body.rests != RESTS || body.reach_m > 0) continue;
+    for (ClusterTree& tree : body.trees) tree.releaseLeaves(records_.data());
   }
 }
 

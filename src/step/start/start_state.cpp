@@ -96,6 +96,9 @@ std::vector<StartIntersection> StartStateSearch::run(const SceneArrays& scene, b
       wanted.most_found == FoundLimit::NONE ? FoundLimit::NONE : std::size_t{tolerance::MAX_SUPERCLUSTER_PAIRS};
   has_deadline_ = deadline.canEnd();
   if (!(continues && known_)) clear();
+  for (std::size_t b = 0; b < neighbourhoods_.size() && found_.empty() && candidates_.empty(); ++b) {
+    if (scene.bodies()[b].rests == RESTS) neighbourhoods_[b] = Neighbourhood();
+  }
   testCandidates(scene, deadline);
   if (!searched_ && !hasEnough()) search(scene, deadline, threads, parallel);
   cut_ = cut_ || hasEnough();
@@ -318,8 +321,8 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   if (beforeListing(deadline).isOver()) return false;
   // What does not meet during the step does not at t=0.
   if (a == b && unfolded_ && (*unfolded_)[a].isCertified()) return true;
-  learnNeighbourhoods(scene);
   for (const std::uint32_t body : next_bodies_) {
+    learn(scene, body);
     if (by_faces) neighbourhoods_[body].learnFaces(scene.bodies()[body]);
   }
   const simd::KnownPairs sharing = neighbourhoods_[a].sharing.view();
@@ -385,8 +388,8 @@ void StartStateSearch::remember(const SceneArrays& scene, const std::vector<Cont
 }
 
 void StartStateSearch::addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out) {
-  learnNeighbourhoods(scene);
   const std::uint32_t a = contact.first_body, b = contact.second_body;
+  learn(scene, a), learn(scene, b);
   Index v[4];  // internal numbers
   for (std::size_t i = 0; i < 4; ++i) {
     v[i] = neighbourhoods_[factsOf(contact.kind).sideOf(i) == 0 ? a : b].internal_of_local[contact.vertex[i]];
@@ -428,12 +431,12 @@ void StartStateSearch::addFacesAtEdge(const SceneArrays& scene, std::uint32_t ed
   }
 }
 
-void StartStateSearch::learnNeighbourhoods(const SceneArrays& scene) {
-  for (std::size_t b = neighbourhoods_.size(); b < scene.bodies().size(); ++b) {
-    Neighbourhood learnt;
-    learnt.learn(scene, b);
-    neighbourhoods_.push_back(std::move(learnt));
-  }
+void StartStateSearch::learn(const SceneArrays& scene, std::size_t body) {
+  if (neighbourhoods_.size() < scene.bodies().size()) neighbourhoods_.resize(scene.bodies().size());
+  if (!neighbourhoods_[body].internal_of_local.empty()) return;
+  Neighbourhood learnt;
+  learnt.learn(scene, body);
+  neighbourhoods_[body] = std::move(learnt);
 }
 
 void StartStateSearch::clear() {

@@ -124,7 +124,7 @@ class StartStateSearch {
   void addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
                       const Index* other_edge, std::vector<EdgeFace>& out);
-  void learnNeighbourhoods(const SceneArrays& scene);
+  void learn(const SceneArrays& scene, std::size_t body);
   bool hasEnough() const { return found_.size() > most_found_; }
 
   bool whole_ = false, has_deadline_ = false;

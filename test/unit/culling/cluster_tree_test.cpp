@@ -174,6 +174,14 @@ TEST(ClusterTree, LeavesThatWaitAreMadeWhenTheyAreNeeded) {
   tree.refitLeaves(records[0].data(), nullptr, 0, groups);
   tree.needLeaves(0);
   EXPECT_TRUE(isThatOf(before, 0));
+
+  tree.releaseLeaves(records[0].data());
+  const std::uint16_t* middle = tree.level(0).soa.data() + 20 * simd::SOA_SIZE;
+#ifdef __linux__
+  EXPECT_EQ(std::count(middle, middle + simd::SOA_SIZE, 0), simd::SOA_SIZE) << "the system has its page";
+#endif
+  tree.needLeaves(20);
+  EXPECT_TRUE(isThatOf(before, 20));
 }
 
 TEST(ClusterTree, MaskedFeaturesAreEmptyAndComeBack) {

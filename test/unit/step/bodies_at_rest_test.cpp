@@ -7,6 +7,7 @@
 #include <string>
 
 #include "support/brute_force.h"
+#include "step/history.h"
 #include "support/shapes.h"
 
 namespace dccd {
@@ -115,14 +116,14 @@ TEST(BodiesAtRest, WhatIsNotFiniteHidesNoContact) {
 /// Everything that can happen to a stream, at random.
 TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
   const Waved scene;
-  std::uint64_t kept = 0, contacts = 0;
+  std::uint64_t kept = 0, contacts = 0, contacts_after_rest = 0;
   for (unsigned seed = 1; seed <= 30; ++seed) {
     std::mt19937 random(seed);
     const auto oneIn = [&](unsigned n) { return random() % n == 0; };
     Options with, without;
     with.num_threads = 1 + static_cast<int>(seed % 2);
     without.keep_bounds = false;
-    const bool distant = oneIn(3);
+    const bool distant = oneIn(3), rests = oneIn(2);  // so long that what was made of it is given back
     if (distant) with.accuracy.rung = without.accuracy.rung = Accuracy::CONSERVATIVE;
     Detector keeps(with), forgets(without);
     Positions at[2] = {scene.rest, scene.moving};
@@ -136,8 +137,9 @@ TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
       if (oneIn(15)) at[1] = movedBy(at[1], {0.2, 0, 0});  // a teleport
       Step step;
       for (int b = 0; b < (both ? 2 : 1); ++b) {
-        Positions t1 = oneIn(6) ? scene.at(k + 7 * b) : at[b];
-        if (oneIn(15)) t1[random() % 81].x() = std::nan("");
+        const bool stays = rests && b == 0 && k < 30;
+        Positions t1 = !stays && oneIn(6) ? scene.at(k + 7 * b) : at[b];
+        if (!stays && oneIn(15)) t1[random() % 81].x() = std::nan("");
         step.bodies.push_back(moving(scene.setups[static_cast<std::size_t>(b)], at[b], t1));
         if (distant) step.bodies.back().minimum_separation_m = 0.002;
         if (std::all_of(t1.begin(), t1.end(), [](const Vec3& p) { return p.allFinite(); })) at[b] = t1;
@@ -151,9 +153,12 @@ TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
       EXPECT_EQ(b.stats.bodies_kept, 0u);
       kept += a.stats.bodies_kept;
       contacts += a.contacts.size();
+      const SceneBody& first = History::Impl::of(keeps.history()).scene.bodies()[0];
+      contacts_after_rest += first.rests > RESTS ? a.contacts.size() : 0;
     }
   }
   EXPECT_GT(kept, 300u);
+  EXPECT_GT(contacts_after_rest, 100u);
   EXPECT_GT(contacts, 1000u);
 }
 
