@@ -87,6 +87,7 @@ class PathDistances;
 struct AlongPath {
   SafeUntil until;
   SpeedScale scale;                         ///< without a law 0
+  double scale_by_bounds = 0;               ///< without the path
   PathContact contact = PathContact::FREE;  ///< of all pairs: the worst
   bool rests_on_path = false;               ///< `until` is later than without one
   std::string unused;                       ///< why the path says nothing; empty: it was used

@@ -32,7 +32,8 @@ constexpr int ERROR = 1, NOT_PROVED = 3;
 
 struct Arguments {
   std::vector<std::string> bags;
-  std::string out, report, params, octomap, tf_static, accuracy, mesh, robot, command;
+  std::string out, report, params, octomap, tf_static, accuracy, mesh, robot, command,
+      intended = BagReplayOptions().intended_topic;
   double look_ahead_s = 0;
   int threads = 0;
   bool without_map = false, study = false, quiet = false, pieces = false;
@@ -188,6 +189,14 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
   return NOT_PROVED;
 }
 
+/// Of a run with `intent` and `speed_scale`.
+std::optional<SpeedScales> scalesOf(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
+  if (!pipeline.config().speed_law || !pipeline.config().intent) return std::nullopt;
+  const AlongPath& along = pipeline.intended().along;
+  const double said = speedScaleAt(outcome, pipeline, at).scale;
+  return SpeedScales{said, along.unused.empty() ? std::min(said, along.scale_by_bounds) : said};
+}
+
 int analyze(const Arguments& a) {
   for (const std::string& bag : a.bags) refuseToOverwrite(bag, {a.out});
   for (const std::string& input : {a.params, a.octomap, a.robot, a.tf_static}) refuseToOverwrite(input, {a.out});
@@ -195,16 +204,18 @@ int analyze(const Arguments& a) {
   BagReplayOptions options;
   options.octomap_file = a.octomap;
   options.tf_static_file = a.tf_static;
+  options.intended_topic = a.intended;
   options.show_progress = !a.quiet;
   BagReplay replay(a.bags, config, options);
   Report report(a.report);  // makes the folder, in which the results may lie, too
   std::unique_ptr<ResultBag> out =
-      a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, replay.lentTransforms());
+      a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, replay.lentTransforms(), bagTopic(a.intended));
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
         const std::vector<Body>& bodies = pipeline.monitor().bodies();
-        report.add(outcome, bodies, static_cast<std::int64_t>(at.toNSec()), bodies[config.monitor.clock_body].name);
+        report.add(outcome, bodies, static_cast<std::int64_t>(at.toNSec()), bodies[config.monitor.clock_body].name,
+                   scalesOf(outcome, pipeline, at));
         answered = answered || outcome.answered;
         if (out) out->add(outcome, pipeline, so_far, at);
       },
@@ -213,6 +224,9 @@ int analyze(const Arguments& a) {
       },
       [&](const Outcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
+      },
+      [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
+        if (out) out->addAhead(outcome, pipeline, at);
       });
   if (out) out->close();
   describe(a, config, summary, report);
@@ -247,6 +261,8 @@ int main(int argc, char** argv) {
       app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
   app.add_option("--tf-static", a.tf_static, "bag whose /tf_static holds for frames that have none in the others")
       ->check(CLI::ExistingFile);
+  app.add_option("--intended", a.intended, "the bag's ~intended, where the parameters have intent")
+      ->capture_default_str();
   app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")
       ->excludes(octomap);
   app.add_option("--accuracy", a.accuracy, "exact, or conservative for distances");

@@ -10,7 +10,6 @@
 #include <rosbag/view.h>
 #include <tf2/exceptions.h>
 
-#include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "input/message_type.h"
 #include "input/short_text.h"
@@ -47,7 +46,9 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
 struct BagReplay::Run {
   const Sink& sink;
   const Sink& predictions;
+  const Sink& anew;
   const Variation& variation;
+  const std::string intended_topic;
   const OpenBags bags;
   tf2::BufferCore transforms{TransformWindow::length()};
   TransformFeed feed{transforms};
@@ -65,10 +66,12 @@ struct BagReplay::Run {
   std::vector<ros::Time> last_came;  // of each body, its last message; 0: none
   bool repeats_latched = false;      // as rosbag record --repeat-latched does at the begin of a piece
 
-  Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
+  Run(const BagReplay& r, const Sink& to, const Sink& predictions_to, const Sink& anew_to)
       : sink(to),
         predictions(predictions_to),
+        anew(anew_to),
         variation(r.options_.variation),
+        intended_topic(r.config_.intent ? bagTopic(r.options_.intended_topic) : ""),
         bags(r.paths_),
         pipeline(r.config_, feed),
         last_came(r.config_.bodies.size()) {
@@ -86,6 +89,8 @@ struct BagReplay::Run {
     }
     for (const std::string& sentence : r.config_.robot.missing) complain(sentence);
     for (const std::string& sentence : r.config_.robot.hints) complain("robot: " + sentence);
+    if (!intended_topic.empty() && r.topics_.count(intended_topic) == 0)
+      complain("the bag has nothing on " + intended_topic + ", to which intent listens");
   }
 
   /// The prediction that follows from an answered outcome, whose statistics get its cost.
@@ -172,6 +177,25 @@ struct BagReplay::Run {
     }
     const std::string hint = pipeline.takeMapHint();
     if (!hint.empty()) complain(hint);
+    complainOfIntended(pipeline.takeIntendedProblem());
+  }
+
+  void complainOfIntended(const std::string& problem) {
+    const bool is_told = problem.empty() || !complained.insert("intended " + IntendedMotion::kindOf(problem)).second;
+    if (!is_told) complain(intended_topic + ": " + problem);
+  }
+
+  /// It counts at once.
+  void intended(const rosbag::MessageInstance& message) {
+    drain(message.getTime());
+    try {
+      complainOfIntended(pipeline.intention(message)());
+    } catch (const std::exception& error) {
+      complainOfIntended(std::string("a message was lost: ") + error.what());
+    }
+    const Outcome* const outcome = pipeline.reconsider();
+    if (outcome && anew) anew(*outcome, pipeline, summary, message.getTime());
+    complainOfIntended(pipeline.takeIntendedProblem());
   }
 
   void mesh(std::size_t body, const rosbag::MessageInstance& message, std::vector<std::uint8_t> bytes) {
@@ -402,8 +426,9 @@ void BagReplay::tellMissing(Run& run) const {
   }
 }
 
-BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
-  Run run(*this, sink, predictions);
+BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions,
+                                const Sink& anew) {
+  Run run(*this, sink, predictions, anew);
   const std::vector<std::string> map_topics = config_.liveMapNames();
   const bool may_use_map = run.pipeline.effects().mayUseMap();
   const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
@@ -446,6 +471,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     for (const std::string& line : run.feed.takeProblems()) run.complain("tf: " + line);
     if (is_mesh) run.meshes(bodies->second, m, bytes);
     run.cameraInfo(m);
+    if (m.getTopic() == run.intended_topic) run.intended(m);
     const bool is_map = bag_maps && std::count(map_topics.begin(), map_topics.end(), m.getTopic()) > 0;
     if (is_map && !std::exchange(first_is_taken, false)) run.mapMessage(m);
     run.placeCloud(at);

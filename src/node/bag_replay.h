@@ -11,6 +11,7 @@
 #include <ros/time.h>
 #include <rosbag/bag.h>
 
+#include "input/known_types.h"
 #include "node/bag_reading.h"
 #include "node/map_loader.h"
 #include "node/monitor_pipeline.h"
@@ -28,6 +29,7 @@ struct Variation {
 struct BagReplayOptions {
   std::string octomap_file;    ///< instead of the bag's maps; empty: none
   std::string tf_static_file;  ///< a bag whose /tf_static holds for frames that have none in this one; empty: none
+  std::string intended_topic = std::string(MONITOR_NAMESPACE) + "/intended";  ///< the bag's ~intended
   bool show_progress = false;
   Variation variation;
 };
@@ -76,8 +78,9 @@ class BagReplay {
   /// across a loop's end before the meshes have come to it, too; a map that
   /// was recorded after the first frame (latched ones are, often) is known from the start.
   /// `predictions` gets, where there is a look-ahead, that of each step after the step itself; of a step without an
-  /// answer the step again.
-  BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr);
+  /// answer the step again. `anew` gets the newest answer where something else is intended since then.
+  BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr,
+                       const Sink& anew = nullptr);
 
  private:
   struct Run;

@@ -123,33 +123,17 @@ void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShi
 }
 
 /// A trajectory of joints, or a twist of a frame.
-void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) {
-  const auto hand = [this](const auto& motion) {
-    queue.command([this, motion] {
-      const std::string problem = pipeline.intend(*motion);
-      if (!problem.empty()) complainOfIntended(problem);
-    });
-  };
-  try {
-    if (message->getDataType() == ros::message_traits::datatype<trajectory_msgs::JointTrajectory>()) {
-      hand(message->instantiate<trajectory_msgs::JointTrajectory>());
-    } else if (message->getDataType() == ros::message_traits::datatype<geometry_msgs::TwistStamped>()) {
-      hand(message->instantiate<geometry_msgs::TwistStamped>());
-    } else {
-      const std::string type = message->getDataType();
-      queue.command(
-          [this, type] { complainOfIntended("has type " + type + "; it takes JointTrajectory and TwistStamped"); });
-    }
-  } catch (const std::exception& error) {
-    tellLost(private_node.resolveName("intended"), error);
-  }
+void CollisionMonitor::Impl::onIntended(const ShapeShifter::ConstPtr& message) try {
+  queue.command([this, intend = pipeline.intention(*message)] {
+    const std::string problem = intend();
+    if (!problem.empty()) complainOfIntended(problem);
+  });
+} catch (const std::exception& error) {
+  tellLost(private_node.resolveName("intended"), error);
 }
 
-/// A kind of mistake is what is said of it up to the first name, but for numbers: these make no line of their own.
 void CollisionMonitor::Impl::complainOfIntended(const std::string& problem) {
-  std::string kind = problem.substr(0, problem.find('\''));
-  kind.erase(std::remove_if(kind.begin(), kind.end(), [](char c) { return !std::isalpha(c) && c != '/'; }), kind.end());
-  log.complain("intended " + kind, private_node.resolveName("intended"), problem);
+  log.complain("intended " + IntendedMotion::kindOf(problem), private_node.resolveName("intended"), problem);
 }
 
 void CollisionMonitor::Impl::onMap(std::size_t source, const ros::MessageEvent<RawMessage>& event) try {

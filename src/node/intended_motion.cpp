@@ -162,6 +162,12 @@ std::string IntendedMotion::add(Motion motion, std::string problem, StampNs newe
   return "";
 }
 
+std::string IntendedMotion::kindOf(const std::string& problem) {
+  std::string kind = problem.substr(0, problem.find('\''));
+  kind.erase(std::remove_if(kind.begin(), kind.end(), [](char c) { return !std::isalpha(c) && c != '/'; }), kind.end());
+  return kind;
+}
+
 void IntendedMotion::drop(const std::string& problem) {
   forget();
   problem_ = problem;

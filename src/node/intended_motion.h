@@ -53,6 +53,8 @@ class IntendedMotion {
   IntendedPath asked(trajectory_msgs::JointTrajectory message, const Step& step,
                      const std::vector<CarriedBody>& carried, const Lookup& lookup, std::string& problem) const;
   void forget() { motions_.clear(); }
+  /// Problems of one kind differ in numbers and in what follows the first name: only the first of them is told.
+  static std::string kindOf(const std::string& problem);
 
  private:
   static constexpr std::size_t MOST_WAITING = 1000;  // motions that begin later

@@ -53,11 +53,25 @@ AlongPath MonitorPipeline::searchAlong(const IntendedPath& path, FirstTouch* fir
   return path_search_.run(*answered_, options, speedBounds(), config_.speed_law, path, deadline, first);
 }
 
-ApproachLimits MonitorPipeline::limitsAfter(const Outcome& outcome) {
+deformable_ccd::SafeUntil MonitorPipeline::safeUntilMessage(const Outcome& outcome, const ros::Time& now) const {
+  deformable_ccd::SafeUntil promise = toSafeUntil(outcome, promises_, speedBounds(), now, fixed_frame_);
+  if (intended_.along.rests_on_path) promise.assumed.push_back(assumedOf(outcome, intended_.path));
+  return promise;
+}
+
+deformable_ccd::Limits MonitorPipeline::limitsMessage(const Outcome& outcome) {
+  const auto& [max_m, horizon_s] = *config_.limits;
+  if (outcome.answered && !statement_.assurance.proved)  // or its promises are void
+    return toLimits(outcome, {{}, {}, horizon_s, 0, {"the step is not proved"}}, {}, fixed_frame_);
   const Options& options = monitor_->options().detector;
   const Deadline deadline = Deadline::after(tolerance::LOOK_AHEAD_SHARE * timeLimitMs(options));
-  return approach_search_.run(outcome, options, speedBounds(), config_.limits->max_m, config_.limits->horizon_s,
-                              deadline);
+  const std::vector<SpeedBound> bounds = speedBounds();
+  const ApproachLimits limits = approach_search_.run(outcome, options, bounds, max_m, horizon_s, deadline);
+  return toLimits(outcome, limits, bounds, fixed_frame_);
+}
+
+deformable_ccd::AlongPath MonitorPipeline::alongPathMessage(const Outcome& outcome) const {
+  return toAlongPath(outcome, intended_.path, intended_.along, fixed_frame_);
 }
 
 /// Whatever it throws, what the bounds alone allow stands.

@@ -12,6 +12,9 @@
 #include <string>
 #include <vector>
 
+#include <deformable_ccd/AlongPath.h>
+#include <deformable_ccd/Limits.h>
+#include <deformable_ccd/SafeUntil.h>
 #include <deformable_ccd/WouldTouch.h>
 
 #include "config/monitor_config.h"
@@ -131,6 +134,21 @@ class MonitorPipeline {
   /// empty: it holds. Where nobody listens to it nothing happens.
   std::string intend(const trajectory_msgs::JointTrajectory& message) { return intendAny(message); }
   std::string intend(const geometry_msgs::TwistStamped& message) { return intendAny(message); }
+  /// The same of a message of whatever type, as it came or a bag has it: read now, and told when it is called. Throws
+  /// what reading it throws.
+  template <class Any>
+  std::function<std::string()> intention(const Any& message) {
+    const std::string type = message.getDataType();
+    const auto tells = [this](const auto& motion) -> std::function<std::string()> {
+      if (!motion) return [] { return std::string("has another definition of its type"); };
+      return [this, motion] { return intendAny(*motion); };
+    };
+    using Trajectory = trajectory_msgs::JointTrajectory;
+    using Twist = geometry_msgs::TwistStamped;
+    if (type == ros::message_traits::datatype<Trajectory>()) return tells(message.template instantiate<Trajectory>());
+    if (type == ros::message_traits::datatype<Twist>()) return tells(message.template instantiate<Twist>());
+    return [type] { return "has type " + type + "; it takes JointTrajectory and TwistStamped"; };
+  }
   /// The newest answer, if something else is intended since it was last looked at: what follows is another promise and
   /// scale now, which are no less than by bounds alone. Null: all stands.
   const Outcome* reconsider();
@@ -149,8 +167,11 @@ class MonitorPipeline {
   std::string takeIntendedProblem() { return motion_ ? motion_->takeProblem() : std::string(); }
   /// How fast what slows down may go after this outcome, the last one.
   SpeedScale speedScale(const Outcome& outcome) const;
-  /// Of this outcome, the last one; only with `limits`.
-  ApproachLimits limitsAfter(const Outcome& outcome);
+  /// What is published of this outcome, the last one: ~safe_until, and only with `limits` ~limits, with `intent`
+  /// ~along_path. `now`: when that is.
+  deformable_ccd::SafeUntil safeUntilMessage(const Outcome& outcome, const ros::Time& now) const;
+  deformable_ccd::Limits limitsMessage(const Outcome& outcome);
+  deformable_ccd::AlongPath alongPathMessage(const Outcome& outcome) const;
   /// What may be said of the last outcome.
   const Statement& statement() const { return statement_; }
   /// How fast bodies are assumed to be, by body. A rigid one in the fixed frame stands still.

@@ -217,23 +217,10 @@ void CollisionMonitor::Impl::publishVoided() {
 
 /// Beside the scale: until when nothing touches, and what is intended.
 void CollisionMonitor::Impl::publishAhead(const Outcome& outcome) {
-  const auto& [path, along] = pipeline.intended();
-  const std::string& frame = pipeline.fixedFrame();
-  if (config.promises()) {
-    deformable_ccd::SafeUntil promise =
-        toSafeUntil(outcome, pipeline.promises(), pipeline.speedBounds(), ros::Time::now(), frame);
-    if (along.rests_on_path) promise.assumed.push_back(assumedOf(outcome, path));
-    outputs.publishSafeUntil(promise);
-  }
-  if (config.limits) {
-    outputs.publishLimits([&] {
-      if (outcome.answered && !pipeline.statement().assurance.proved)  // or its promises are void
-        return toLimits(outcome, {{}, {}, config.limits->horizon_s, 0, {"the step is not proved"}}, {}, frame);
-      return toLimits(outcome, pipeline.limitsAfter(outcome), pipeline.speedBounds(), frame);
-    });
-  }
+  if (config.promises()) outputs.publishSafeUntil(pipeline.safeUntilMessage(outcome, ros::Time::now()));
+  if (config.limits) outputs.publishLimits([&] { return pipeline.limitsMessage(outcome); });
   if (!config.intent) return;
-  outputs.publishAlongPath(toAlongPath(outcome, path, along, frame));
+  outputs.publishAlongPath(pipeline.alongPathMessage(outcome));
   const std::string problem = pipeline.takeIntendedProblem();
   if (!problem.empty()) complainOfIntended(problem);
 }

@@ -124,6 +124,12 @@ else { const all = R.clearance.curves, hue = k => COLOURS[1 + k % (COLOURS.lengt
   all.forEach((c, k) => { note.appendChild(document.createElement('i')).style.background = hue(k); note.append(who(c)); });
   document.getElementById('promises').textContent = R.promises;
   if (R.clearance.left_out) note.append(` and ${R.clearance.left_out} more in clearance.csv`); }
+// The scale of a step holds until the next.
+{ const scaled = R.steps.filter(s => s.scales);
+  if (!scaled.length) document.getElementById('scales_part').remove();
+  else { const a = axes('scales', 180, 1, 'scale');
+    [[1, '#f0a030'], [0, '#2a6fb0']].forEach(([k, stroke]) => el('polyline', { 'stroke-width': 1.5, stroke, fill: 'none', points: scaled.flatMap((s, i) =>
+      [i ? scaled[i - 1] : s, s].map(before => `${a.x(s.t)},${a.y(before.scales[k])}`)).join(' ') }, a.svg)); } }
 function frontPlot(id, all, xlabel, ylabel, least) {
   const H = 400, floor = H - 46, box = document.getElementById(id), points = all.filter(p => p.x > 0 && p.y !== null).map(p => ({ ...p, y: Math.max(p.y, least) }));
   if (!points.length) { box.remove(); return; }

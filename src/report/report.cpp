@@ -212,11 +212,11 @@ void Report::addTimes(const Outcome& o) {
   total_ms_.push_back(o.stats.total_ms);
 }
 
-void Report::add(const Outcome& o, const std::vector<Body>& bodies, std::int64_t told_ns,
-                 const std::string& clock_body) {
+void Report::add(const Outcome& o, const std::vector<Body>& bodies, std::int64_t told_ns, const std::string& clock_body,
+                 const std::optional<SpeedScales>& scales) {
   if (frames_ == 0) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
   writeStep(o, told_ns, clock_body);
-  addRow(o);
+  addRow(o, scales);
   addProof(o);
   writePatches(o, bodies);  // a seam without an answer has events, too
   lanes_.add(o, bodies, origin_ns_);

@@ -19,6 +19,11 @@
 
 namespace dccd {
 
+/// What ~speed_scale said, and would have said without ~intended.
+struct SpeedScales {
+  double said = 0, by_bounds = 0;
+};
+
 /// Writes into a folder: contacts.csv, steps.csv, patches.csv and events.csv (the same bytes for any number of
 /// threads), timing.csv, clearance.csv (distances, where they were asked for), report.json and report.html. Outcomes
 /// are added in order; kept are their summaries and, in a bounded amount of memory, what the page's player shows.
@@ -29,7 +34,7 @@ class Report {
 
   /// told_ns: when it was answered, by the clock of the receipts; 0: nobody knows.
   void add(const Outcome& outcome, const std::vector<Body>& bodies, std::int64_t told_ns = 0,
-           const std::string& clock_body = {});
+           const std::string& clock_body = {}, const std::optional<SpeedScales>& scales = std::nullopt);
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
   /// What became of the promises of ~safe_until, in words; empty: there were none.
   void setPromises(std::string in_words) { promises_ = std::move(in_words); }
@@ -68,7 +73,7 @@ class Report {
   void addProof(const Outcome& outcome);
   std::size_t unprovedFrames() const;
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
-  void addRow(const Outcome& outcome);
+  void addRow(const Outcome& outcome, const std::optional<SpeedScales>& scales);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
   void addTimes(const Outcome& outcome);
   void writeStep(const Outcome& outcome, std::int64_t told_ns, const std::string& clock_body);

@@ -26,19 +26,20 @@ nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json
 
 }  // namespace
 
-void Report::addRow(const Outcome& o) {
+void Report::addRow(const Outcome& o, const std::optional<SpeedScales>& scales) {
   const double time_s = secondsBetween(origin_ns_, o.stamp_ns);
-  const nlohmann::json row = {{"step", o.sequence},
-                              {"t", time_s},
-                              {"status", toString(o.status)},
-                              {"reason", o.reason},
-                              {"answered", o.answered},
-                              {"start_state", toString(o.start_state)},
-                              {"clear", assuranceOf(o).clear()},
-                              {"contacts", o.total_contacts},
-                              {"undecided", o.counts.undecided},
-                              {"initial", o.counts.initial},
-                              {"ms", o.stats.total_ms}};
+  nlohmann::json row = {{"step", o.sequence},
+                        {"t", time_s},
+                        {"status", toString(o.status)},
+                        {"reason", o.reason},
+                        {"answered", o.answered},
+                        {"start_state", toString(o.start_state)},
+                        {"clear", assuranceOf(o).clear()},
+                        {"contacts", o.total_contacts},
+                        {"undecided", o.counts.undecided},
+                        {"initial", o.counts.initial},
+                        {"ms", o.stats.total_ms}};
+  if (scales) row["scales"] = {scales->said, scales->by_bounds};
   if (!rows_.empty()) rows_ += ",\n";
   rows_ += toText(row, -1);
 }

@@ -372,6 +372,7 @@ AlongPath PathSearch::run(const Outcome& outcome, const Options& options, const 
   AlongPath result;
   result.until = safeUntil(outcome, bounds);
   if (law) result.scale = speedScale(outcome, bounds, *law);
+  result.scale_by_bounds = result.scale.scale;
   result.unused = whyNone(outcome);
   if (result.unused.empty()) result.unused = problemOf(path, outcome.step->bodies);
   if (!result.unused.empty()) return result;

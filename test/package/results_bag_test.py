@@ -74,14 +74,14 @@ class ResultsBagTest(AnalyzeBagTestCase):
     def test_the_bag_of_results_has_every_topic_of_the_node(self):
         out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
         params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\neffects: {clearance: on}\n'  # more than the cloth's edges
-                          'max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}\nlimits: {max_m: 0.3, horizon_s: 0.1}\n')
+                          'max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}\nlimits: {max_m: 0.3, horizon_s: 0.1}\n'
+                          'intent: {horizon_s: 1, deviation_m: 0.01}\n')
         self.analyze('all', self.bag, '--params', params, '-o', out)
         messages = by_topic(out)
         topics = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
                   for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
         self.assertGreater(len(topics), 10)
-        # A bag has no ~intended, whose answer that is.
-        self.assertEqual({OWN + topic for topic in topics} - set(messages), {OWN + 'along_path'})
+        self.assertEqual({OWN + topic for topic in topics} - set(messages), set())
         effects = messages[OWN + 'effects']
         self.assertEqual({e.name for e in effects[-1].status if {v.key: v.value for v in e.values}['running'] == 'true'} & {'look_ahead', 'minimum_separation'},
                          {'look_ahead', 'minimum_separation'})

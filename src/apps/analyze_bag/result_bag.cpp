@@ -16,8 +16,8 @@
 
 namespace dccd {
 
-ResultBag::ResultBag(const std::string& path, tf2_msgs::TFMessage lent)
-    : bag_(path), diagnostics_(MONITOR_NAMESPACE), lent_(std::move(lent)) {}
+ResultBag::ResultBag(const std::string& path, tf2_msgs::TFMessage lent, std::string intended_topic)
+    : bag_(path), diagnostics_(MONITOR_NAMESPACE), lent_(std::move(lent)), intended_topic_(std::move(intended_topic)) {}
 
 template <class Message>
 void ResultBag::write(const char* name, const ros::Time& at, const Message& message) {
@@ -53,7 +53,7 @@ void ResultBag::copy(const rosbag::MessageInstance& m, const MonitorPipeline& pi
                diagnostics_.take(now_ns, m.getTime(), countersOf(pipeline, so_far), true, map_source_, ""));
   }
   const std::string own = std::string(MONITOR_NAMESPACE) + "/";
-  if (m.getTopic().compare(0, own.size(), own) == 0) return;
+  if (m.getTopic().compare(0, own.size(), own) == 0 && m.getTopic() != intended_topic_) return;
   if (m.getTopic() == DIAGNOSTICS_TOPIC && copyOthersDiagnostics(m)) return;
   bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
 }
@@ -97,28 +97,33 @@ void ResultBag::addState(const Outcome& outcome, const MonitorPipeline& pipeline
   std_msgs::Bool clear;
   clear.data = state.clear;
   write("clear", at, clear);
-  addPromise(outcome, pipeline, state.proved, at);
 }
 
-void ResultBag::addPromise(const Outcome& outcome, const MonitorPipeline& pipeline, bool proved, const ros::Time& at) {
-  const MonitorConfig& config = pipeline.config();
-  const std::string& frame = pipeline.fixedFrame();
-  const std::vector<SpeedBound> bounds = pipeline.speedBounds();
-  if (config.promises()) write("safe_until", at, toSafeUntil(outcome, pipeline.promises(), bounds, at, frame));
-  if (!config.speed_law) return;
-  deformable_ccd::SpeedScale speed = toSpeedScale(outcome, bounds, *config.speed_law, frame);
+deformable_ccd::SpeedScale speedScaleAt(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
+  deformable_ccd::SpeedScale speed = toSpeedScale(outcome, pipeline.speedScale(outcome), pipeline.fixedFrame());
   const std::string too_old =
-      whyTooOld(secondsBetween(outcome.stamp_ns, static_cast<StampNs>(at.toNSec())), 0, *config.speed_law);
-  if (!proved) {
+      whyTooOld(secondsBetween(outcome.stamp_ns, static_cast<StampNs>(at.toNSec())), 0, *pipeline.config().speed_law);
+  if (!pipeline.statement().assurance.proved) {
     limitSpeed("not proved", speed);
   } else if (!too_old.empty()) {
     limitSpeed(too_old, speed);
   }
   speed.header.stamp = at;
-  write("speed_scale", at, speed);
-  std_msgs::Float64 value;
-  value.data = speed.scale;
-  write("speed_scale/value", at, value);
+  return speed;
+}
+
+void ResultBag::addAhead(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at) {
+  const MonitorConfig& config = pipeline.config();
+  if (config.promises()) write("safe_until", at, pipeline.safeUntilMessage(outcome, at));
+  if (config.speed_law) {
+    const deformable_ccd::SpeedScale speed = speedScaleAt(outcome, pipeline, at);
+    write("speed_scale", at, speed);
+    std_msgs::Float64 value;
+    value.data = speed.scale;
+    write("speed_scale/value", at, value);
+  }
+  if (config.limits) write("limits", at, pipeline.limitsMessage(outcome));
+  if (config.intent) write("along_path", at, pipeline.alongPathMessage(outcome));
 }
 
 void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far,
@@ -135,9 +140,12 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
     write("clearance", at, toClearanceArray(outcome, bodies, frame));
   }
   addState(outcome, pipeline, at);
-  if (pipeline.config().limits && pipeline.statement().assurance.proved)
-    write("limits", at, toLimits(outcome, pipeline.limitsAfter(outcome), pipeline.speedBounds(), frame));
-  if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
+  addAhead(outcome, pipeline, at);
+  if (!frame.empty()) {
+    visualization_msgs::MarkerArray markers = toMarkers(outcome, bodies, pipeline.config().markers, frame);
+    addPath(outcome, pipeline.intended().path, frame, markers);
+    write("markers", at, markers);
+  }
   diagnostics_.add(outcome, context.latency_s);
   const MonitorConfig& config = pipeline.config();
   map_source_ = pipeline.effects().mapExpected() ? config.mapName() : "";
