@@ -69,7 +69,7 @@ def with_unknown(map_, box):
 class Owned:
     def __init__(self, world):
         self.world, self.reach = world, world.owners()  # by name, how near a voxel is to be [m]; 'auto' for the edge of one
-        self.lag = int(world.params.get('own_voxels_lag_s', 0.1) * NS)
+        self.lag, self.trust = int(world.params.get('own_voxels_lag_s', 0.1) * NS), world.params.get('own_voxels_doubt') == 'trust'
         self.clock = getattr(world.tracks.get(world.clock_body), 'every', [])
         self.of = {}  # by the map's number: what may be own, what may be in doubt
         statics = world.transforms.static.values()
@@ -188,7 +188,7 @@ class Owned:
                 near = fresh[self.reached(name, fresh, ways, back, reach[name], m.resolution)]
                 first = min((f.stamp for f in w.tracks[name].every or self.clock), default=0)  # from then on its place is known
                 is_known = before is not None and (not w.tracks[name].moves or first <= m.stamp)
-                if is_known:
+                if is_known or self.trust:
                     own = np.union1d(own, near)
                 else:
                     doubt = np.union1d(doubt, near)

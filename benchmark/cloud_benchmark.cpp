@@ -144,10 +144,10 @@ Case lidarCase(int frames) {
 }
 
 void setModel(octomap::OcTree& tree, const CloudMapOptions& options) {
-  tree.setProbHit(options.HIT);
-  tree.setProbMiss(options.MISS);
-  tree.setClampingThresMin(options.MIN);
-  tree.setClampingThresMax(options.MAX);
+  tree.setProbHit(options.hit);
+  tree.setProbMiss(options.miss);
+  tree.setClampingThresMin(options.min);
+  tree.setClampingThresMax(options.max);
 }
 
 /// OctomapServer::insertScan() for the points that are no ground, with its defaults.

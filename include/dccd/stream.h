@@ -32,6 +32,7 @@ struct MonitorOptions {
   double own_voxels_lag_s = 0.1;
   /// Of detector.expected, where one body holds the other: what was one's own may become the other's.
   std::vector<Expectation> held;
+  bool own_voxels_trust = false;  ///< what the first map shows where a body is, is its own
   /// A map's own voxels are told on a thread of their own, by the frames of when that began, and until it is done steps
   /// have the map before. Else in the step that takes the map, and which map a step has follows from the stamps alone.
   bool own_voxels_beside = false;

@@ -49,9 +49,8 @@ MonitorConfig configure(const Arguments& a) {
     tree.put("topic", a.mesh);
   } else if (!tree.has("bodies") && !tree.has("topic")) {
     ParameterTree copy = tree;
-    ParameterTree& given = copy.members["obstacle_cloud_topic"];
-    std::vector<std::string> clouds{given.text};
-    for (ParameterTree& one : given.items) {
+    std::vector<std::string> clouds{copy.members["obstacle_cloud_topic"].text};
+    for (ParameterTree& one : copy.members["obstacle_cloud_topics"].items) {
       clouds.push_back(one.kind == ParameterTree::Kind::TEXT ? one.text : one.members["topic"].text);
     }
     const std::string topic = BagReplay::firstMeshTopic(a.bags, clouds);

@@ -34,7 +34,7 @@ struct EffectScene {
   bool predictions_heard = false;               ///< somebody subscribes to them
   double look_ahead_s = 0;
   bool clearance_wanted = false;      ///< by a parameter, or a subscriber to distances
-  bool unknown_space_counts = false;  ///< unknown_box is given
+  bool unknown_space_counts = false;  ///< unknown_space is not `free`
 };
 
 struct EffectDecision {

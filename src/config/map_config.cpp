@@ -11,15 +11,11 @@ namespace {
 // Each has a place to wait, and all that wait share an eighth of max_map_mb.
 constexpr std::size_t MOST_CLOUD_TOPICS = 16;
 
-std::optional<Box> readBox(ParameterReader& reader, const char* name) {
-  const ParameterTree& box = reader.raw(name);
-  if (!box.isSet()) return std::nullopt;
-  const auto n = reader.numbers(box, name, 6);
-  const Box read{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
-  if (read.empty()) {
-    reader.fail(name, "is empty; [x0, y0, z0, x1, y1, z1] in the map's frame, the smaller corner first");
-  }
-  return read;
+void readSensorModel(ParameterReader section, CloudMapOptions& map) {
+  refuseGone(section, "sensor_model/");
+  map.hit = section.number("hit", map.hit, 0.5, 0.9999);
+  map.miss = section.number("miss", map.miss, 0.0001, 0.5);
+  section.finish();
 }
 
 CloudSource readCloudSource(ParameterReader entry) {
@@ -31,14 +27,15 @@ CloudSource readCloudSource(ParameterReader entry) {
   return source;
 }
 
-/// One topic, or a list: of each sensor the topic alone, or with what else there is to say of it.
+/// Of each sensor the topic alone, or with what else there is to say of it.
 void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
-  const char* const name = "obstacle_cloud_topic";
-  const ParameterTree& given = reader.raw("obstacle_cloud_topic");
-  if (!given.isSet()) return;
-  const bool is_one = given.kind == ParameterTree::Kind::TEXT;
-  const std::vector<ParameterTree> items = is_one ? std::vector{given} : reader.list("obstacle_cloud_topic");
-  if (items.empty()) reader.fail(name, "is empty; remove it, or name the clouds' topic");
+  const char* const name = "obstacle_cloud_topics";
+  const std::vector<ParameterTree> items = reader.list("obstacle_cloud_topics");
+  if (items.empty()) return;
+  if (reader.has("obstacle_cloud_topic")) {
+    reader.fail("obstacle_cloud_topic", std::string("has no place beside ") + name +
+                                            "; write {topic: …, camera_info: …, sensor_frame: …} there, and remove it");
+  }
   config.clouds.clear();
   std::set<std::string> topics;
   for (const ParameterTree& item : items) {
@@ -50,7 +47,6 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
     }
     config.clouds.push_back(readCloudSource(ParameterReader(entry, path)));
     const std::string& topic = config.clouds.back().topic;
-    if (topic.empty()) reader.fail(name, "is empty; remove it, or name the clouds' topic");
     if (!topics.insert(topic).second) reader.fail(name, "has '" + topic + "' twice; remove one of the two");
   }
   if (config.clouds.size() > MOST_CLOUD_TOPICS) {
@@ -61,10 +57,14 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
 
 void readClouds(ParameterReader& reader, MonitorConfig& config) {
   // What is said of clouds is said by somebody who has them.
-  for (const char* name : {"obstacle_cloud_topic", "obstacle_resolution_m", "obstacle_min_range_m",
-                           "obstacle_max_range_m", "obstacle_no_return", "obstacle_box"}) {
+  for (const char* name :
+       {"obstacle_cloud_topic", "obstacle_cloud_topics", "obstacle_resolution_m", "obstacle_min_range_m",
+        "obstacle_max_range_m", "obstacle_no_return", "obstacle_box", "sensor_model"}) {
     config.cloud_named = config.cloud_named || reader.has(name);
   }
+  CloudSource& single = config.clouds.front();
+  single.topic = reader.get("obstacle_cloud_topic", single.topic);
+  if (single.topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
   readCloudTopics(reader, config);
   CloudMapOptions& map = config.cloud_map;
   map.resolution_m = reader.number("obstacle_resolution_m", map.resolution_m, 1e-4, 1e3);
@@ -83,7 +83,14 @@ void readClouds(ParameterReader& reader, MonitorConfig& config) {
     reader.fail("obstacle_min_range_m", text.str());
   }
   map.no_return_clears = reader.choice("obstacle_no_return", "stays", {"stays", "clears"}) == "clears";
-  map.box = readBox(reader, "obstacle_box");
+  if (const ParameterTree& box = reader.raw("obstacle_box"); box.isSet()) {
+    const auto n = reader.numbers(box, "obstacle_box", 6);
+    map.box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (map.box->empty()) {
+      reader.fail("obstacle_box", "is empty; [x0, y0, z0, x1, y1, z1] in the map's frame, the smaller corner first");
+    }
+  }
+  readSensorModel(reader.section("sensor_model"), map);
 }
 
 }  // namespace
@@ -103,14 +110,25 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.own_voxels_m = ownVoxelsOf(reader, 0);
   config.monitor.own_voxels_lag_s =
       reader.number("own_voxels_lag_s", config.monitor.own_voxels_lag_s, 0, tolerance::OWN_PATH_S);
-  config.unknown_box = readBox(reader, "unknown_box");
+  config.monitor.own_voxels_trust = reader.choice("own_voxels_doubt", "unproved", {"unproved", "trust"}) == "trust";
+  config.unknown_space = choiceOf(reader, "unknown_space", UnknownSpace::FREE, {"free", "occupied"});
+  const ParameterTree& box = reader.raw("unknown_box");
+  if (box.isSet()) {
+    const auto n = reader.numbers(box, "unknown_box", 6);
+    config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+  }
+  if (config.unknown_space == UnknownSpace::OCCUPIED && config.unknown_box.empty()) {
+    reader.fail("unknown_box",
+                "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
+                "the workspace within which the unknown is an obstacle");
+  }
 }
 
 void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) {
-  if (!config.ownsVoxels() || !config.unknown_box) return;
+  if (!config.ownsVoxels() || config.unknown_space != UnknownSpace::OCCUPIED) return;
   reader.fail("own_voxels_m",
-              "is above 0, but within unknown_box a body's own voxels cannot be told from what is unknown; remove "
-              "unknown_box, or write own_voxels_m: 0");
+              "is above 0, but with unknown_space: occupied a body's own voxels cannot be told from what "
+              "is unknown; write unknown_space: free, or own_voxels_m: 0");
 }
 
 std::vector<std::string> MonitorConfig::liveMapNames() const {

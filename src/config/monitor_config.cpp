@@ -28,14 +28,10 @@ constexpr std::pair<const char*, const char*> GONE[] = {
     {"simd_target", "no answer depends on it, and the best one is taken; remove it"},
     {"max_compute_s", "write step_budget_ms, in milliseconds; without it a step of a live node ends after 500"},
     {"initial_contacts", "contacts are listed all; own_voxels_m takes a body's own voxels out of the map"},
-    {"obstacle_camera_info_topic", "write obstacle_cloud_topic: [{topic: …, camera_info: …}]"},
-    {"obstacle_sensor_frame", "write obstacle_cloud_topic: [{topic: …, sensor_frame: …}]"},
-    {"obstacle_cloud_topics", "write the same list as obstacle_cloud_topic"},
-    {"sensor_model", "its numbers are octomap_server's defaults (hit 0.7, miss 0.4, min 0.12, max 0.97); remove it"},
-    {"unknown_space", "what is unknown within unknown_box is an obstacle, and free without unknown_box; remove it"},
-    {"own_voxels_doubt",
-     "steps that touch a voxel in doubt are not proved; remove it, and give a map without the "
-     "body as octomap_file"},
+    {"obstacle_camera_info_topic", "write obstacle_cloud_topics: [{topic: …, camera_info: …}]"},
+    {"obstacle_sensor_frame", "write obstacle_cloud_topics: [{topic: …, sensor_frame: …}]"},
+    {"sensor_model/min", "no voxel is less probable than 0.12, as in octomap_server; remove it"},
+    {"sensor_model/max", "no voxel is more probable than 0.97, as in octomap_server; remove it"},
     {"markers/normal_length_m", "a normal is five points long; write markers/point_size_m"},
     {"markers/line_width_m", "a line is a fifth of a point wide; write markers/point_size_m"},
     {"markers/max_contacts", "the first 2000 are shown, as RViz can hold them; remove it"},
@@ -43,8 +39,6 @@ constexpr std::pair<const char*, const char*> GONE[] = {
     {"clearance/tolerance_m", "distances are known to 1e-4 m; remove it, or ask the library or Python"},
     {"record_folder", "steps are recorded to deformable_ccd in $ROS_HOME; set ROS_HOME of the node"},
     {"robot/scale", "scale single links by robot/links, or widen all of them by robot/padding_m"},
-    {"robot/timeout_s", "the start waits for the description for 10 s; remove it"},
-    {"bodies/topology/min_range_m", "pixels within 0.01 m of the sensor are no measurement; remove it"},
     {"bodies/weld", "corners of triangles that coincide are one vertex; remove it"},
     {"bodies/max_vertices", "a mesh has at most 1000000 vertices; remove it"},
 };
@@ -181,9 +175,10 @@ std::vector<std::string> beyondLimits(const MonitorConfig& config) {
   }
   for (const BodyConfig& body : config.bodies) {
     if (body.input.source != TopologySource::DEPTH_IMAGE) continue;
-    const DepthSurfaceOptions& depth = body.input.depth;
+    const DepthSurfaceOptions &depth = body.input.depth, plain;
     const std::string what = "what the picture of body '" + body.body.name + "' shows ";
     if (depth.max_range_m > 0) add(what + "farther than ", depth.max_range_m, "topology/max_range_m");
+    if (depth.min_range_m > plain.min_range_m) add(what + "nearer than ", depth.min_range_m, "topology/min_range_m");
     std::ostringstream text;
     text << what << "in points that have no neighbours within topology/max_edge_m, " << depth.max_edge_m << " m";
     if (depth.stride > 1) text << ", and between each pixel and the next one by topology/stride, " << depth.stride;
@@ -207,7 +202,7 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
   add(Effect::RIGID_BODIES, rigid.empty() ? "" : rigid + "'");
   add(Effect::MINIMUM_SEPARATION, largestSeparation(config.monitorBodies()) > 0 ? "the minimum separation" : "");
   add(Effect::TRACKER_NOISE, any_uncertain ? "the uncertainty of positions" : "");
-  add(Effect::UNKNOWN_SPACE, config.unknown_box ? "unknown_box" : "");
+  add(Effect::UNKNOWN_SPACE, config.unknown_space != UnknownSpace::FREE ? "unknown_space" : "");
   return sentences;
 }
 
@@ -238,7 +233,7 @@ void applyEffects(MonitorConfig& config) {
   if (off(Effect::START_STATE)) config.monitor.detector.check_start_state = false;
   if (off(Effect::LOOK_AHEAD)) config.monitor.look_ahead_s = 0;
   config.monitor.detector.patches = !off(Effect::PATCHES);
-  if (off(Effect::UNKNOWN_SPACE)) config.unknown_box.reset();
+  if (off(Effect::UNKNOWN_SPACE)) config.unknown_space = UnknownSpace::FREE;
 }
 
 /// The same text for the same values, wherever they were read from.

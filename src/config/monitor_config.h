@@ -20,6 +20,7 @@
 
 namespace dccd {
 
+enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED };
 enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST, THIN };
 struct BodyConfig {
   Body body;
@@ -106,7 +107,8 @@ struct MonitorConfig {
   std::vector<std::string> expected_phases;  ///< that entries name, whether their bodies are there or not
   std::string phase;                         ///< of the task, in force; empty: none
   std::vector<Hold> holds;
-  std::optional<Box> unknown_box;  ///< [m], map frame: where the unknown is occupied
+  UnknownSpace unknown_space = UnknownSpace::FREE;
+  Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
   bool octomap_topic_named = false;                                ///< as BodyConfig::topic_named
   std::vector<CloudSource> clouds{{DEFAULT_CLOUD_TOPIC, {}, {}}};  ///< that are made a map; one or more
@@ -146,7 +148,7 @@ struct MonitorConfig {
     return std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& b) { return dccd::ownsVoxels(b.body); });
   }
   /// Free leaves of maps are asked for, too.
-  bool needsKnownSpace() const { return unknown_box || ownsVoxels(); }
+  bool needsKnownSpace() const { return unknown_space != UnknownSpace::FREE || ownsVoxels(); }
   /// A separation or an uncertainty is asked for, so that only conservative will do.
   bool holdsDistance() const;
   /// Some body has a speed bound, and distances may be computed: ~safe_until is there.

@@ -48,6 +48,7 @@ RobotConfig readRobotParameters(ParameterReader section) {
   if (robot.description.empty())
     section.fail("description", "is needed: the parameter that holds the URDF, or its file");
   robot.semantic = section.get("semantic", std::string());
+  robot.timeout_s = section.number("timeout_s", robot.timeout_s, 0, LARGE);
   robot.padding_m = section.number("padding_m", robot.padding_m, 0, LARGE);
   robot.own_voxels_m = ownVoxelsOf(section, robot.own_voxels_m);
   robot.max_own_voxels = section.integer("max_own_voxels", robot.max_own_voxels, 0, MANY);
@@ -105,7 +106,8 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
     body.body.against_obstacle = asked.against_map;
     body.body.minimum_separation_m = std::max(asked.paddingOf(part.link), config.minimum_separation_m);
     // Where the unknown is occupied, own voxels cannot be told from it, and nobody asked for them by name.
-    const bool owns = settingOf(config.effects, Effect::OWN_VOXELS) != EffectSetting::OFF && !config.unknown_box;
+    const bool owns = settingOf(config.effects, Effect::OWN_VOXELS) != EffectSetting::OFF &&
+                      config.unknown_space != UnknownSpace::OCCUPIED;
     body.body.own_voxels_m = owns ? asked.own_voxels_m : 0;
     for (std::size_t other = 0; other < robot.parts.size(); ++other) {
       if (other == p || mayMeet(part, robot.parts[other], asked.against_links, never)) continue;

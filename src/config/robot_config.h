@@ -30,6 +30,7 @@ struct LinkSettings {
 struct RobotConfig {
   std::string description;          ///< a parameter's name or a file; empty: no robot
   std::string semantic;             ///< the same of the SRDF; empty: none
+  double timeout_s = 10;            ///< how long a live node waits for the two at its start
   double padding_m = 0;             ///< minimum separation of a link
   double scale = 1;                 ///< of the geometry about the link's origin
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link

@@ -44,7 +44,7 @@ std::optional<PinholeView> CameraInfos::find(StampNs stamp_ns, std::string& why_
   }
   if (fitting.empty()) {
     why_not = "no CameraInfo has come on " + topic_ +
-              "; name its topic by camera_info in obstacle_cloud_topic, or take the camera's cloud";
+              "; name its topic by camera_info in obstacle_cloud_topics, or take the camera's cloud";
     return std::nullopt;
   }
   const PinholeView& last = *fitting.back();

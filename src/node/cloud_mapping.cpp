@@ -208,7 +208,7 @@ SensorView CloudMapping::readCloudOf(const CloudMessage& message, Reading& readi
   } else if (sensor.empty() && frame == frame_) {
     throw WireError("it comes in the map's own frame '" + frame_ +
                     "', which does not tell where the sensor was, so that it fills and clears nothing; name "
-                    "the sensor's frame by sensor_frame in obstacle_cloud_topic, also where that is this one, or send "
+                    "the sensor's frame by sensor_frame in obstacle_cloud_topics, also where that is this one, or send "
                     "the cloud as the sensor made it");
   } else {
     pointsInto(cloud, numbers_);

@@ -31,11 +31,12 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   scene_.map_source = config.mapName();
   if (!map_source.empty()) scene_.map_source = map_source;
   scene_.map_named = config.octomap_topic_named || config.cloud_named;
-  if (config.takesClouds()) scene_.map_parameter = "obstacle_cloud_topic";
+  if (config.takesClouds())
+    scene_.map_parameter = config.clouds.size() == 1 ? "obstacle_cloud_topic" : "obstacle_cloud_topics";
   scene_.map_seen = config.takesMapFileAlone();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
   promised_ = scene_.clearance_wanted = config.promises();
-  scene_.unknown_space_counts = config.unknown_box.has_value();
+  scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
   plan_ = EffectPlan(scene_, settings_);
 }
 

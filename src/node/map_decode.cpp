@@ -38,7 +38,8 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
   const auto counted = [memory](auto made) { return memory ? memory->counted(std::move(made)) : made; };
   // A map that has nothing free does not tell what it has seen: for own voxels, what is not occupied is free there. An
   // empty one has seen nothing: whoever made it began anew.
-  if (config.unknown_box || (config.needsKnownSpace() && (!decoded.free.empty() || decoded.occupied.empty()))) {
+  if (config.unknown_space != UnknownSpace::FREE ||
+      (config.needsKnownSpace() && (!decoded.free.empty() || decoded.occupied.empty()))) {
     std::vector<OccupiedLeaf> known;
     known.reserve(decoded.occupied.size() + decoded.free.size());
     known.assign(decoded.occupied.begin(), decoded.occupied.end());
@@ -47,8 +48,8 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
     map.known = counted(decoded.found ? KnownSpace::build(decoded.resolution_m, known, *std::move(decoded.found))
                                       : KnownSpace::build(decoded.resolution_m, known));
   }
-  if (config.unknown_box) {
-    const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(*config.unknown_box, max_unknown);
+  if (config.unknown_space == UnknownSpace::OCCUPIED) {
+    const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, max_unknown);
     decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
   }
   map.surface = counted(VoxelSurface::build(decoded.resolution_m, std::move(decoded.occupied)));

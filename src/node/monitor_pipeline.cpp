@@ -308,7 +308,7 @@ void MonitorPipeline::doubtMap(const Outcome& outcome) {
     const Body& body = outcome.step->bodies[b];
     if (map_doubts_[b] || !meetsMap(body)) continue;
     // Own voxels are looked for already, or cannot be; a file's are nobody's.
-    if (ownsVoxels(body) || config_.takesMapFileAlone() || config_.unknown_box) continue;
+    if (ownsVoxels(body) || config_.takesMapFileAlone() || config_.unknown_space == UnknownSpace::OCCUPIED) continue;
     std::set<Index> occupied;
     const auto isMet = [b](const std::array<std::uint16_t, 2>& pair, bool expected) {
       return !expected && pair == std::array<std::uint16_t, 2>{static_cast<std::uint16_t>(b), OBSTACLE_BODY};

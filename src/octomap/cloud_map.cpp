@@ -53,10 +53,10 @@ struct CloudMap::Impl {
   ViewReader reader;
 
   explicit Impl(const CloudMapOptions& options) : tree(options.resolution_m) {
-    tree.setProbHit(options.HIT);
-    tree.setProbMiss(options.MISS);
-    tree.setClampingThresMin(options.MIN);
-    tree.setClampingThresMax(options.MAX);
+    tree.setProbHit(options.hit);
+    tree.setProbMiss(options.miss);
+    tree.setClampingThresMin(options.min);
+    tree.setClampingThresMax(options.max);
     limits.resolution_m = options.resolution_m;
     limits.voxels_per_m = 1 / options.resolution_m;
     limits.near_m = options.min_range_m;

@@ -120,10 +120,10 @@ Finding rigidBodies(const EffectScene& scene) {
 }
 
 Finding unknownSpace(const EffectScene& scene) {
-  if (!scene.unknown_space_counts) return impossible("unknown_box is not given");
+  if (!scene.unknown_space_counts) return impossible("unknown_space is free; set it to occupied");
   if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
-  if (!scene.map_used) return idle("unknown_box is given, but there is no map that could know it");
-  return wanted("unknown_box is given");
+  if (!scene.map_used) return idle("unknown_space is not free, but there is no map that could know it");
+  return wanted("unknown_space is not free");
 }
 
 /// The largest separations of the pairs that meet, of each kind of pair [m].

@@ -130,7 +130,8 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
     if (fitsTrusted(next)) {
       if (options.own_voxels_beside && !bodies_tracked.empty()) return tellBeside(taken, bodies_tracked);
       const auto start = Deadline::Clock::now();
-      map = own_voxels.reduce(next, trusted.surface.get(), bodies_tracked, options.own_voxels_lag_s);
+      map = own_voxels.reduce(next, trusted.surface.get(), bodies_tracked, options.own_voxels_lag_s,
+                              options.own_voxels_trust);
       own_voxels_ms += msSince(start);
     }
     maps_to_come.pop_front();  // should memory end before, the next step takes it
@@ -150,22 +151,23 @@ void Monitor::Impl::tellBeside(std::size_t count, std::vector<TrackedBody> bodie
     body.frames = &frames.back();  // there it stays when the vector moves
   }
   // Where there can be no thread the next step tells it.
-  telling = std::async(std::launch::async | std::launch::deferred,
-                       [this, next = std::move(next), sure = trusted.surface, tracked = std::move(bodies_tracked),
-                        frames = std::move(frames), lag_s = options.own_voxels_lag_s] {
-                         const auto start = Deadline::Clock::now();
-                         ToldMaps told;
-                         try {
-                           for (const ObstacleMap& map : next) {
-                             told.map = own_voxels.reduce(map, sure.get(), tracked, lag_s);
-                             ++told.count;
-                           }
-                         } catch (const std::bad_alloc&) {  // the others are told later
-                           if (told.count == 0) throw;
-                         }
-                         told.ms = msSince(start);
-                         return told;
-                       });
+  telling =
+      std::async(std::launch::async | std::launch::deferred,
+                 [this, next = std::move(next), sure = trusted.surface, tracked = std::move(bodies_tracked),
+                  frames = std::move(frames), lag_s = options.own_voxels_lag_s, trust = options.own_voxels_trust] {
+                   const auto start = Deadline::Clock::now();
+                   ToldMaps told;
+                   try {
+                     for (const ObstacleMap& map : next) {
+                       told.map = own_voxels.reduce(map, sure.get(), tracked, lag_s, trust);
+                       ++told.count;
+                     }
+                   } catch (const std::bad_alloc&) {  // the others are told later
+                     if (told.count == 0) throw;
+                   }
+                   told.ms = msSince(start);
+                   return told;
+                 });
 }
 
 void Monitor::Impl::finishTelling() {
@@ -216,7 +218,7 @@ void Monitor::Impl::forgetOwnVoxels(std::size_t body) {
   finishTelling();
   if (!own_voxels.forgetBody(static_cast<std::uint16_t>(body)) || !map.surface) return;
   const ObstacleMap before = std::exchange(map, ObstacleMap());  // should memory end, there is none until the next one
-  map = own_voxels.reducedAnew(before, trusted.surface.get(), tracked());
+  map = own_voxels.reducedAnew(before, trusted.surface.get(), tracked(), options.own_voxels_trust);
 }
 
 /// What is in doubt matters to a step that would touch it, were it an obstacle.

@@ -117,9 +117,12 @@ void OwnVoxelFinder::appear(const ReachedCube& cube, Look& look) {
   const bool was_seen = wasSeenAgain(cube.leaf);
   const bool was_free = look.change.has_before && !was_seen && !unseen_.holds(cube.leaf) &&
                         look.unknown.count(packed(cube.leaf.min)) == 0;
+  const auto isNotYet = [&](int body) { return look.not_yet.count(body) > 0; };
   BodySet owners = look.ownersOf(cube);
-  owners.removeIf([&](int body) { return look.not_yet.count(body) > 0; });
-  const VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
+  owners.removeIf(isNotYet);
+  VoxelState state = nextState(was_free ? VoxelState::FREE : VoxelState::UNKNOWN, look.occupied(cube, owners));
+  const bool on_trust = look.trust_first && !cube.near.empty() && (!was_free || isNotYet(*cube.near.begin()));
+  if (on_trust) state = VoxelState::OWN;
   if (((was_free && look.shows_growth) || was_seen) && state != VoxelState::OWN)
     growth_.add(cube.leaf, state == VoxelState::DOUBT, before_ns_, look.map.stamp_ns);
   if (state == VoxelState::OBSTACLE) return;
@@ -280,7 +283,7 @@ std::string OwnVoxelFinder::gapBefore(const ObstacleMap& map) const {
 }
 
 ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies,
-                                   double lag_s) {
+                                   double lag_s, bool trust_first) {
   const double resolution_m = map.surface->resolution();
   for (TrackedBody& body : bodies) {
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
@@ -297,6 +300,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
              known_before_ ? &KnownSpace::Impl::treeOf(*known_before_) : nullptr, before_ != nullptr},
             trusted ? VoxelSurface::Impl::of(*trusted).tree : NO_VOXELS,
             shapes_,
+            trust_first,
             is_blind || since_s > tolerance::OWN_GAP_S,
             is_blind,
             past_.size() > 1};
@@ -339,7 +343,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
       static_cast<std::uint64_t>(std::count_if(look.cubes.begin(), look.cubes.end(), [](const ReachedCube& cube) {
         return cube.why == ReachedCube::Why::APPEARED;
       }));
-  return withoutOwn(std::move(next), trusted, bodies);
+  return withoutOwn(std::move(next), trusted, bodies, trust_first);
 }
 
 }  // namespace dccd

@@ -38,9 +38,9 @@ class OwnVoxelFinder {
   /// the map's frame and resolution. Maps come in the order of their stamps. One of another frame or resolution, or
   /// whose frame moved, or after forget(), is a first one, and so is one after which more than MOST_REMEMBERED cubes
   /// would be remembered that it does not show. Where ObstacleMap::known does not tell, what is not occupied counts as
-  /// free. Bodies are known at the map's stamp.
-  ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies,
-                     double lag_s);
+  /// free. Bodies are known at the map's stamp; trust_first: what is first seen with a body near is its own.
+  ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies, double lag_s,
+                     bool trust_first);
   void forget();
   /// Why one that came is not given, for the sentence about the gap that it leaves.
   void say(const std::string& why) { why_lost_ = why; }
@@ -48,7 +48,7 @@ class OwnVoxelFinder {
   bool forgetBody(std::uint16_t body);
   /// What reduce() made of the last map, by what is own now.
   ObstacleMap reducedAnew(const ObstacleMap& reduced, const VoxelSurface* trusted,
-                          const std::vector<TrackedBody>& bodies);
+                          const std::vector<TrackedBody>& bodies, bool trust_first);
   /// For a map of this stamp, or a later one: since when the bodies' ways are needed.
   StampNs pathNeededFrom(StampNs now_ns, double lag_s) const;
 
@@ -95,7 +95,8 @@ class OwnVoxelFinder {
   /// Which maps came between the last one and this one, in words.
   std::string gapBefore(const ObstacleMap& map) const;
   /// The map without what is own or in doubt, with what is trusted.
-  ObstacleMap withoutOwn(ObstacleMap map, const VoxelSurface* trusted, const std::vector<TrackedBody>& bodies);
+  ObstacleMap withoutOwn(ObstacleMap map, const VoxelSurface* trusted, const std::vector<TrackedBody>& bodies,
+                         bool trust_first);
 
   std::shared_ptr<const VoxelSurface> before_;      // as it was given; null: none
   std::shared_ptr<const KnownSpace> known_before_;  // null: what is not occupied there is free

@@ -17,7 +17,7 @@ struct OwnVoxelFinder::Look {
   MapChange change;
   const VoxelTree& sure;
   RigidShapes& shapes;
-  bool is_gap;
+  bool trust_first, is_gap;
   bool is_blind;                        // the gap is longer than any way that is known
   bool shows_growth;                    // else what was free was so by one map alone: a sensor's first look
   std::set<int> seamed{}, not_yet{};    // bodies of which some of the way is not known; whose first frame is later

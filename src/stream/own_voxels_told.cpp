@@ -13,7 +13,8 @@ std::string countOf(std::uint64_t count) { return std::to_string(count) + (count
 
 /// Sets the counts of what is own and what is in doubt, and a sentence of each, by body. gap: before the map that put
 /// some in doubt, in words.
-void describe(const std::vector<TrackedBody>& bodies, bool tells_free, const std::string& gap, OwnVoxels& own) {
+void describe(const std::vector<TrackedBody>& bodies, bool trust_first, bool tells_free, const std::string& gap,
+              OwnVoxels& own) {
   for (const TrackedBody& body : bodies) {
     std::uint64_t its = 0, doubted = 0;
     for (const OwnVoxel& voxel : *own.voxels) {
@@ -30,10 +31,14 @@ void describe(const std::vector<TrackedBody>& bodies, bool tells_free, const std
     }
   }
   if (!own.excluded.empty() && !tells_free) own.excluded += ", by a map that shows nothing as free";
+  if (!own.excluded.empty() && trust_first)
+    own.excluded += ", by own_voxels_doubt: trust what is first seen there, too";
   if (!own.doubt.empty()) {
     own.doubt = "the step touches one of " + own.doubt + " that no look has told from an obstacle";
     if (!gap.empty()) own.doubt += ", after " + gap;
-    own.doubt += "; let the camera see the place once without the body, or give a map without it as octomap_file";
+    own.doubt +=
+        "; let the camera see the place once without the body, give a map without it as octomap_file, or set "
+        "own_voxels_doubt: trust";
   }
   const auto isSeen = [](const OwnVoxel& voxel) { return voxel.body == NOBODY; };
   const auto seen = static_cast<std::uint64_t>(std::count_if(own.voxels->begin(), own.voxels->end(), isSeen));
@@ -46,16 +51,16 @@ void describe(const std::vector<TrackedBody>& bodies, bool tells_free, const std
 }  // namespace
 
 ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelSurface* trusted,
-                                        const std::vector<TrackedBody>& bodies) {
+                                        const std::vector<TrackedBody>& bodies, bool trust_first) {
   ObstacleMap map = reduced;
   map.surface = before_;
   map.own = OwnVoxels();
   map.own.looked_at = reduced.own.looked_at;
-  return withoutOwn(std::move(map), trusted, bodies);
+  return withoutOwn(std::move(map), trusted, bodies, trust_first);
 }
 
 ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trusted,
-                                       const std::vector<TrackedBody>& bodies) {
+                                       const std::vector<TrackedBody>& bodies, bool trust_first) {
   const double resolution_m = map.surface->resolution();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
   const VoxelTree& sure = trusted ? VoxelSurface::Impl::of(*trusted).tree : nothing;
@@ -77,7 +82,7 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   }
   map.own.doubted_surface = doubted.empty() ? nullptr : VoxelSurface::build(resolution_m, std::move(doubted));
   map.own.voxels = share(std::move(voxels));
-  describe(bodies, map.known != nullptr, gap_, map.own);
+  describe(bodies, trust_first, map.known != nullptr, gap_, map.own);
   if (!without.empty()) {
     map.surface = VoxelSurface::build(
         resolution_m, leavesWithout(VoxelSurface::Impl::of(*map.surface).tree, VoxelTree(without), sure.leaves()));

@@ -44,8 +44,9 @@ class LiveFuzzTest(AttackTest):
                   'effects/octomap': r.choice(['on', 'on', 'off']), 'octomap_topic': '/fuzz_map', 'look_ahead_s': r.choice([0.0, 0.1]),
                   'markers/mesh': r.choice(['true', 'false']), 'markers/obstacle_m': r.choice([0.0, 0.5]),
                   'fixed_frame': r.choice(['world', '']), 'transform_timeout_s': r.choice([0.0, 0.1]),
-                  'step_budget_ms': r.choice([200.0, 200.0, 5.0]), 'uncertainty/radius_m': r.choice([0.0, 0.0, 0.001])}
-        self.lists = r.choice([{}, {}, {'unknown_box': [-1, -1, -1, 1, 1, 1]}])
+                  'step_budget_ms': r.choice([200.0, 200.0, 5.0]), 'uncertainty/radius_m': r.choice([0.0, 0.0, 0.001]),
+                  'unknown_space': r.choice(['free', 'free', 'occupied'])}
+        self.lists = {'unknown_box': [-1, -1, -1, 1, 1, 1]}
         if r.random() < 0.4:
             self.lists['exclude_boxes'] = [[-0.5, -0.5, -0.5, 0.5003, 0.5, 0.5]]
         return chosen

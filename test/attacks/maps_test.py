@@ -87,8 +87,9 @@ class MapsTest(AttackTest):
         self.assert_quiet(time.monotonic() - begin, 4)
 
     def test_the_unknown_between_known_voxels(self):
-        rospy.set_param('/unknown/unknown_box', [-3, -3, -3, 3, 3, 3])
-        self.start('unknown')
+        box = [-3, -3, -3, 3, 3, 3]
+        rospy.set_param('/unknown/unknown_box', box)
+        self.start('unknown', unknown_space='occupied')
         for depth in (3, 6, 4, 7):
             data = checkerboard(depth)
             self.give(data)

@@ -68,7 +68,7 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         for frame in self.cloths:
             messages += [('/points', plate, frame[2] - genpy.Duration.from_sec(0.001)), frame]
         clouded = self.write('clouded.bag', messages)
-        given = 'obstacle_cloud_topic: [{topic: points, sensor_frame: world}]\nobstacle_resolution_m: 0.02\n'
+        given = 'obstacle_cloud_topics: [{topic: points, sensor_frame: world}]\nobstacle_resolution_m: 0.02\n'
         words = self.params(given)
         status, said, complaints, statuses = self.analyzed('clouded', clouded, *words)
         self.assertEqual((status, set(statuses)), (0, {'FIRST_FRAME', 'OK'}), complaints)

@@ -355,7 +355,7 @@ class CellTest(FolderTestCase):
         self.cell('seam', 'octomap_topic: /octomap_binary\nown_voxels_m: 0.02\n', obstacle='true', lowest=0.08, more=more, cell=body)
         self.holds(3)
         points = lambda at: [('/points', cloud([(0.4, 0.4, 0.4)] + [(0.012, 0.013, 0.47)] * (k > 4), at(k)), at(k)) for k in range(11)]
-        self.cell('seam and clouds', 'obstacle_cloud_topic: [{topic: /points, sensor_frame: finger}]\nown_voxels_m: 0.02\n', obstacle='true', lowest=0.08,
+        self.cell('seam and clouds', 'obstacle_cloud_topics: [{topic: /points, sensor_frame: finger}]\nown_voxels_m: 0.02\n', obstacle='true', lowest=0.08,
                   more=lambda at: [*points(at), *more(at)[:11]], cell=body)
         self.holds(3)
 
@@ -371,7 +371,7 @@ class CellTest(FolderTestCase):
 
     def test_clouds(self):
         points = lambda at: [('/points', cloud([(0.012, 0.013, 0.08), (0.4, 0.4, 0.4)], at(k)), at(k)) for k in range(11)]
-        self.cell('clouds', 'obstacle_cloud_topic: [{topic: /points, sensor_frame: finger}]\n', lowest=0.08, obstacle='true', more=points)
+        self.cell('clouds', 'obstacle_cloud_topics: [{topic: /points, sensor_frame: finger}]\n', lowest=0.08, obstacle='true', more=points)
         self.holds()
         self.refuted('state', self.nothing_touches, 'clear', 'of cloth and .* of octomap meet')
 
@@ -554,7 +554,7 @@ class CellTest(FolderTestCase):
     def test_what_an_older_cloud_shows(self):
         """A point of the first cloud alone, to which no ray comes again."""
         points = lambda at: [('/points', cloud([(0.012, 0.013, 0.08)] * (k == 0) + [(0.4, 0.4, 0.4)], at(k)), at(k)) for k in range(11)]
-        self.cell('older', 'obstacle_cloud_topic: [{topic: /points, sensor_frame: finger}]\n', lowest=0.08, obstacle='true', more=points)
+        self.cell('older', 'obstacle_cloud_topics: [{topic: /points, sensor_frame: finger}]\n', lowest=0.08, obstacle='true', more=points)
         self.holds(7)
         self.refuted('state', self.nothing_touches, 'clear', 'of cloth and .* of octomap meet')
 

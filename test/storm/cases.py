@@ -406,7 +406,7 @@ def a_first_map_that_shows_the_body_and_perhaps_more(c):
 
 
 def a_space_below_a_sheet_of_which_nothing_is_known(c):
-    c.params.update(unknown_box=[-.1, -.1, -.1, .2, .2, .35])
+    c.params.update(unknown_space='occupied', unknown_box=[-.1, -.1, -.1, .2, .2, .35])
     c.body('sheet', SMALL, 2, every(.1), z=down)
     c.map([(9, 9, 9)], -.05, free=[(x, y, z) for x in range(-2, 4) for y in range(-2, 4) for z in range(2, 7)])
 

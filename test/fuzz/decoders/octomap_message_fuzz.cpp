@@ -39,6 +39,7 @@ void octomap_message(const std::uint8_t* data, std::size_t size) {
   static const MonitorConfig config = [] {
     MonitorConfig c;
     c.max_map_bytes = 1 << 20;
+    c.unknown_space = UnknownSpace::OCCUPIED;
     c.unknown_box = Box{Vec3::Constant(-1), Vec3::Constant(1)};
     return c;
   }();

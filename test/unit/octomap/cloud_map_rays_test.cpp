@@ -105,10 +105,10 @@ Rays allRays(const SensorView& view, const CloudMapOptions& options) {
 class ByVoxels {
  public:
   explicit ByVoxels(const CloudMapOptions& options) : tree_(options.resolution_m) {
-    tree_.setProbHit(options.HIT);
-    tree_.setProbMiss(options.MISS);
-    tree_.setClampingThresMin(options.MIN);
-    tree_.setClampingThresMax(options.MAX);
+    tree_.setProbHit(options.hit);
+    tree_.setProbMiss(options.miss);
+    tree_.setClampingThresMin(options.min);
+    tree_.setClampingThresMax(options.max);
   }
   void insert(const Keys& cleared, const Keys& filled) {
     for (const Key& key : cleared) {

@@ -89,6 +89,7 @@ Defaults defaultsInTheCode() {
       {"topology/max_edge_m", shown(body.input.depth.max_edge_m)},
       {"topology/stride", shown(body.input.depth.stride)},
       {"topology/max_range_m", shown(body.input.depth.max_range_m)},
+      {"topology/min_range_m", shown(body.input.depth.min_range_m)},
       {"topology/median", shown(body.input.depth.median)},
       {"marker/namespace", body.input.marker_namespace ? "set" : "none"},
       {"marker/id", body.input.marker_id ? "set" : "none"},
@@ -198,10 +199,14 @@ Defaults inForceOfTheNode() {
           {"obstacle_min_range_m", plain(config.cloud_map.min_range_m)},
           {"obstacle_max_range_m", plain(config.cloud_map.max_range_m)},
           {"obstacle_no_return", config.cloud_map.no_return_clears ? "clears" : "stays"},
+          {"sensor_model/hit", plain(config.cloud_map.hit)},
+          {"sensor_model/miss", plain(config.cloud_map.miss)},
           {"own_voxels_m", plain(config.own_voxels_m)},
           {"own_voxels_lag_s", plain(monitor.own_voxels_lag_s)},
+          {"own_voxels_doubt", monitor.own_voxels_trust ? "trust" : "unproved"},
           {"octomap_timeout_s", plain(monitor.octomap_timeout_s)},
           {"max_map_mb", plain(config.max_map_bytes / MB)},
+          {"unknown_space", config.unknown_space == UnknownSpace::FREE ? "free" : "another"},
           {"answer_timeout_s", plain(config.answer_timeout_s)},
           {"transform_timeout_s", plain(config.transform_timeout_s)},
           {"patch_gap_s", plain(monitor.patch_gap_s)},
@@ -213,6 +218,7 @@ Defaults inForceOfTheNode() {
           {"markers/point_size_m", plain(config.markers.point_size_m)},
           {"markers/mesh", plain(config.markers.mesh)},
           {"markers/obstacle_m", plain(config.markers.obstacle_m)},
+          {"robot/timeout_s", plain(robot.timeout_s)},
           {"robot/padding_m", plain(robot.padding_m)},
           {"robot/max_own_voxels", plain(robot.max_own_voxels)},
           {"robot/own_voxels_m", robot.own_voxels_m == ONE_VOXEL ? "auto" : plain(robot.own_voxels_m)},
@@ -251,6 +257,7 @@ TEST(InterfacePage, DefaultsOfTheNodeAreThoseInForceWhereNoneIsGiven) {
                                       "limits/max_m",
                                       "minimum_separation_pairs",
                                       "obstacle_box",
+                                      "obstacle_cloud_topics",
                                       "octomap_file",
                                       "octomap_frame",
                                       "phase",
@@ -260,8 +267,7 @@ TEST(InterfacePage, DefaultsOfTheNodeAreThoseInForceWhereNoneIsGiven) {
                                       "robot/max_speed_m_s",
                                       "robot/semantic",
                                       "speed_scale/reaction_time_s",
-                                      "speed_scale/stopping_time_s",
-                                      "unknown_box"};
+                                      "speed_scale/stopping_time_s"};
   EXPECT_EQ(others, without);
 }
 

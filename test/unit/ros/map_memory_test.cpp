@@ -79,10 +79,10 @@ TEST(MapMemory, LeavesThatNeedMoreThanThereIsAreRefused) {
   const std::size_t room = memory.accept({1000, 1000, 100, 100});
   config.monitor.detector.exclude_boxes = {Box{Vec3::Zero(), Vec3::Ones()}};
   EXPECT_LT(memory.accept({1000, 1000, 100, 100}), room);
-  config.unknown_box = Box{Vec3::Zero(), Vec3::Ones()};
+  config.unknown_space = UnknownSpace::OCCUPIED;
   config.max_map_bytes = std::size_t{128} << 20;
   EXPECT_THROW(memory.accept({100, 1000000, 100, 50000}), OctomapError) << "free leaves count where they are kept";
-  config.unknown_box.reset();
+  config.unknown_space = UnknownSpace::FREE;
   EXPECT_NO_THROW(memory.accept({100, 1000000, 100, 50000}));
 }
 

@@ -31,7 +31,7 @@ TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
   EXPECT_TRUE(with("obstacle_cloud_topic: /points").takesClouds());
   EXPECT_TRUE(with("obstacle_resolution_m: 0.02").namesOctomap());
   const MonitorConfig two = with(
-      "obstacle_cloud_topic: [/a, {topic: /b, camera_info: /info, sensor_frame: /lens}], obstacle_box: [0, 0, 0, "
+      "obstacle_cloud_topics: [/a, {topic: /b, camera_info: /info, sensor_frame: /lens}], obstacle_box: [0, 0, 0, "
       "1, 2, 3]");
   EXPECT_TRUE(two.takesClouds());
   EXPECT_EQ(two.mapName(), "/a, /b");
@@ -110,9 +110,11 @@ TEST(Parameters, WhatLimitsLeaveOutOfCloudsAndPicturesIsSaid) {
                                       "what clouds show outside of obstacle_box"}));
   EXPECT_TRUE(excludedBy("obstacle_cloud_topic: /points, obstacle_max_range_m: 0.0").empty());
   const std::string picture = "bodies: {cloth: {topic: cloth}, seen: {motion: static, topology: {source: depth_image, ";
-  EXPECT_EQ(excludedBy(picture + "max_range_m: 4.0}}}"),
+  EXPECT_EQ(excludedBy(picture + "max_range_m: 4.0, min_range_m: 0.5}}}"),
             (std::vector<std::string>{
                 "what the picture of body 'seen' shows farther than 4 m by topology/max_range_m",
+                "what the picture of body 'seen' shows nearer than 0.5 m by "
+                "topology/min_range_m",
                 "what the picture of body 'seen' shows in points that have no neighbours within topology/max_edge_m, "
                 "0.05 m, and between each pixel and the next one by topology/stride, 4",
             }));

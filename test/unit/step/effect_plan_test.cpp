@@ -105,7 +105,7 @@ TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
 
   EffectScene unknown = cloth();
   unknown.unknown_space_counts = true;
-  const char* const no_map = "unknown_box is given, but there is no map that could know it";
+  const char* const no_map = "unknown_space is not free, but there is no map that could know it";
   expectIdle(unknown, Effect::UNKNOWN_SPACE, no_map);
   unknown.map_used = true;
   EXPECT_TRUE(EffectPlan(unknown, {}).running(Effect::UNKNOWN_SPACE));

@@ -65,12 +65,13 @@ MeshFrame sheet(StampNs stamp_ns, double z) {
 class OwnVoxels : public ::testing::Test {
  protected:
   void SetUp() override { start(0.05); }
-  void start(double reach_m, double lag_s = 0, bool beside = false) {
+  void start(double reach_m, bool trust = false, double lag_s = 0, bool beside = false) {
     Body body = named("cloth");
     body.own_voxels_m = reach_m;
     MonitorOptions options = loose();
     options.detector.obstacle_expected = true;
     options.own_voxels_lag_s = lag_s;
+    options.own_voxels_trust = trust;
     options.own_voxels_beside = beside;
     options.store.max_step_s = 2;
     monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{body});
@@ -122,7 +123,7 @@ TEST_F(OwnVoxels, WhatAMapFirstShowsWhereTheBodyIsIsNoObstacle) {
 
 /// Each map is told by the frames that were there when it came, also where more come until that is done.
 TEST_F(OwnVoxels, BesideTheStepsTheyAreTheSame) {
-  start(0.05, 0, true);
+  start(0.05, false, 0, true);
   const std::unique_ptr<Monitor> beside = std::move(monitor_);
   start(0.05);
   const std::unique_ptr<Monitor> within = std::move(monitor_);
@@ -162,7 +163,7 @@ TEST_F(OwnVoxels, BesideTheStepsTheyAreTheSame) {
 TEST_F(OwnVoxels, BesideTheStepsAMapGivesWayToNoneAndToTheEnd) {
   const Cells many = layer(8, 0, 100) + layer(6, 0, 100);
   for (const bool ends : {false, true}) {
-    start(0.05, 0, true);
+    start(0.05, false, 0, true);
     map(-100 * MS, slab(1));
     feed(0, 0.55);
     map(0, many);
@@ -353,6 +354,16 @@ TEST_F(OwnVoxels, WhatIsFoundThereWithoutTheBodyIsAnObstacle) {
   }
 }
 
+TEST_F(OwnVoxels, TheFirstMapOnTrust) {
+  start(0.05, true);
+  feed(0, 0.55);
+  map(0, slab(1) + voxelsOf(0.55));
+  const Outcome first = feed(100 * MS, 0.55);
+  EXPECT_TRUE(assuranceOf(first).clear());
+  ASSERT_EQ(first.excluded.size(), 1u);
+  EXPECT_NE(first.excluded[0].find("own_voxels_doubt: trust"), std::string::npos);
+}
+
 // The price: an obstacle that appears within reach. But none that comes from outside.
 TEST_F(OwnVoxels, WhatAppearsWithinReachOfABodyIsNamedAsLeftOut) {
   for (const bool reaches_out : {false, true}) {
@@ -373,7 +384,7 @@ TEST_F(OwnVoxels, WhatAppearsWithinReachOfABodyIsNamedAsLeftOut) {
 
 TEST_F(OwnVoxels, WhatTheCameraSawBeforeItsStampIsOwnWithinTheLag) {
   for (const double lag_s : {0.0, 0.06}) {
-    start(0.05, lag_s);
+    start(0.05, false, lag_s);
     hoverAboveFloor();
     feed(110 * MS, 0.85);
     map(150 * MS, slab(1) + voxelsOf(0.55));
@@ -618,7 +629,7 @@ TEST_F(OwnVoxels, MapsOfBeforeTheFirstFrameAreLookedAtInTheirOrder) {
 
 // A bag that loops: what is kept of the bodies' ways follows the clock.
 TEST_F(OwnVoxels, AfterAClockThatWentBackAllIsInDoubt) {
-  start(0.05, 0.15);
+  start(0.05, false, 0.15);
   hoverAboveFloor();
   feed(300 * MS, 0.55);
   map(300 * MS, slab(1) + voxelsOf(0.55));
@@ -751,7 +762,7 @@ TEST_F(OwnVoxels, OverStepsThatAreNotWantedWhatIsOwnIsFollowed) {
 /// who else was near then nobody can tell.
 TEST_F(OwnVoxels, WhileTheLagReachesBackBeyondAResetTheyStay) {
   const Cells aloft{{5, 5, 12}};
-  start(0.05, 0.1);
+  start(0.05, false, 0.1);
   hoverAboveFloor();
   map(100 * MS, slab(1) + voxelsOf(0.55));
   EXPECT_EQ(own(feed(140 * MS, 0.55)), 25u);

@@ -63,7 +63,7 @@ CloudMessage messageOf(const Message& message, std::size_t source = 0, StampNs r
 
 inline XmlRpcValue cloudScene(const std::string& more = "") {
   XmlRpcValue tree = scene(more);
-  if (!tree.hasMember("obstacle_cloud_topic")) tree["obstacle_cloud_topic"] = "/camera/points";
+  if (!tree.hasMember("obstacle_cloud_topics")) tree["obstacle_cloud_topic"] = "/camera/points";
   tree["obstacle_resolution_m"] = 0.1;
   return tree;
 }

@@ -221,7 +221,7 @@ TEST_F(Clouds, OneThatWasRefusedIsNamedUntilAReset) {
 }
 
 TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
-  Seen occupied(cloudScene("unknown_box: [0, 0, 0, 1, 1, 1]"));
+  Seen occupied(cloudScene("unknown_space: occupied, unknown_box: [0, 0, 0, 1, 1, 1]"));
   occupied.showCamera();
   const LoadedMap map = occupied.add(tableFrom(1));
   ASSERT_TRUE(map.known) << map.problem;

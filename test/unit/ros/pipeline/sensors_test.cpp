@@ -337,7 +337,7 @@ TEST(Sensors, ACloudInTheMapsOwnFrameTellsWhereItsSensorWas) {
   EXPECT_EQ(lost.add(pointsOf(1, tableDepth, false)).surface, nullptr) << "that of another name was refused";
   EXPECT_TRUE(says(lost.whyNot(inWorld("torn")), "its points were seen from different places"));
   for (const bool by_fields : {false, true}) {
-    Camera camera(by_fields ? "" : "obstacle_cloud_topic: [{topic: /points, sensor_frame: camera}]");
+    Camera camera(by_fields ? "" : "obstacle_cloud_topics: [{topic: /points, sensor_frame: camera}]");
     const LoadedMap map = camera.add(inWorld(by_fields ? "whole" : ""));
     ASSERT_TRUE(map.surface) << map.problem;
     EXPECT_EQ(keysOf(*map.surface), keysOf(*own.surface)) << by_fields;
@@ -345,7 +345,7 @@ TEST(Sensors, ACloudInTheMapsOwnFrameTellsWhereItsSensorWas) {
 }
 
 TEST(Sensors, WhatIsSeenThroughFromTheNamedSensorIsCleared) {
-  Camera camera("obstacle_cloud_topic: [{topic: /points, sensor_frame: camera}]");
+  Camera camera("obstacle_cloud_topics: [{topic: /points, sensor_frame: camera}]");
   const auto inWorld = [](std::array<float, 3> p) { return cloudOf(1, {p}, "world"); };
   EXPECT_EQ(camera.add(inWorld({0.05f, 0.05f, 0.55f})).surface->leafCount(), 1u);
   for (int i = 0; i < 2; ++i) camera.add(inWorld({0.05f, 0.05f, 0.05f}));
@@ -430,7 +430,7 @@ TEST(Sensors, WhatLiesOutsideOfTheBoxIsNotKept) {
 // With two on one topic most steps were proved while a box that one of them saw was not in the map.
 TEST(Sensors, OfSeveralCamerasEachMustHaveItsPlaceInTheMap) {
   Camera camera(
-      "obstacle_cloud_topic: [/left/points, {topic: /right/points, sensor_frame: right}], "
+      "obstacle_cloud_topics: [/left/points, {topic: /right/points, sensor_frame: right}], "
       "octomap_timeout_s: 1.0");
   camera.showCamera("right");
   const auto left = [&](double later = 0) { return camera.whyNot(cloudOf(1, {{0, 0, 0.8f}}), 0, later); };

@@ -1,4 +1,4 @@
-// What the map does not know, as `unknown_box` has it: ignored or an obstacle.
+// What the map does not know, as `unknown_space` has it: ignored or an obstacle.
 #include <gtest/gtest.h>
 
 #include "dccd/assurance.h"
@@ -20,7 +20,7 @@ TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
 }
 
 TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
-  Driven occupied(scene("unknown_box: [0, 0, 0, 0.5, 0.5, 0.6]"));
+  Driven occupied(scene("unknown_space: occupied, unknown_box: [0, 0, 0, 0.5, 0.5, 0.6]"));
   occupied.giveMap(1);
   occupied.feed(1, 0.12f);
   const Outcome& outcome = occupied.feed(1.1, 0.28f);
