@@ -18,6 +18,8 @@ add_library(deformable_ccd_python MODULE ${PYTHON_SOURCES})
 pybind11_extension(deformable_ccd_python)
 # Recordings and explanations are no part of the public headers.
 target_include_directories(deformable_ccd_python PRIVATE src)
+# Not every pybind11 adds them: that of Debian 13 does not.
+target_include_directories(deformable_ccd_python SYSTEM PRIVATE ${Python3_INCLUDE_DIRS})
 target_compile_options(deformable_ccd_python PRIVATE ${COLD_CODE})
 target_compile_definitions(deformable_ccd_python PRIVATE DCCD_VERSION="${PROJECT_VERSION}")
 target_link_libraries(deformable_ccd_python PRIVATE deformable_ccd pybind11::module)
