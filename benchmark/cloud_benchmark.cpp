@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/cloud_map.h"
+#include "dccd/tolerances.h"
 #include "support/seen_scene.h"
 #include "support/timing.h"
 
@@ -144,10 +145,10 @@ Case lidarCase(int frames) {
 }
 
 void setModel(octomap::OcTree& tree, const CloudMapOptions& options) {
-  tree.setProbHit(options.HIT);
-  tree.setProbMiss(options.MISS);
-  tree.setClampingThresMin(options.MIN);
-  tree.setClampingThresMax(options.MAX);
+  tree.setProbHit(tolerance::MAP_HIT);
+  tree.setProbMiss(tolerance::MAP_MISS);
+  tree.setClampingThresMin(tolerance::MAP_LEAST);
+  tree.setClampingThresMax(tolerance::MAP_MOST);
 }
 
 /// OctomapServer::insertScan() for the points that are no ground, with its defaults.

@@ -18,10 +18,6 @@ struct CloudMapOptions {
   double resolution_m = 0.05;  ///< edge of a voxel
   double max_range_m = 0;  ///< what is seen further away only clears so far; 0: it fills, and clears MOST_RAY_VOXELS
   double min_range_m = 0;  ///< a point that is nearer to the sensor is no measurement
-  // octomap_server's sensor model: probabilities that a voxel is occupied.
-  static constexpr double HIT = 0.7;               ///< in which a point lies
-  static constexpr double MISS = 0.4;              ///< that a ray goes through
-  static constexpr double MIN = 0.12, MAX = 0.97;  ///< no voxel's is taken to be less, or more
   bool no_return_clears = false;  ///< a pixel that is infinite has seen through all that is within the range
   std::optional<Box> box;         ///< [m, map frame] voxels that are not in it, be it in part, stay unknown
 };

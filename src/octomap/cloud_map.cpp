@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "dccd/tolerances.h"
 #include "octomap/leaf_lists.h"
 #include "octomap/map_builder.h"
 #include "octomap/octree_update.h"
@@ -53,10 +54,10 @@ struct CloudMap::Impl {
   ViewReader reader;
 
   explicit Impl(const CloudMapOptions& options) : tree(options.resolution_m) {
-    tree.setProbHit(options.HIT);
-    tree.setProbMiss(options.MISS);
-    tree.setClampingThresMin(options.MIN);
-    tree.setClampingThresMax(options.MAX);
+    tree.setProbHit(tolerance::MAP_HIT);
+    tree.setProbMiss(tolerance::MAP_MISS);
+    tree.setClampingThresMin(tolerance::MAP_LEAST);
+    tree.setClampingThresMax(tolerance::MAP_MOST);
     limits.resolution_m = options.resolution_m;
     limits.voxels_per_m = 1 / options.resolution_m;
     limits.near_m = options.min_range_m;

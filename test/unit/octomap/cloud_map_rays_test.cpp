@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/cloud_map.h"
+#include "dccd/tolerances.h"
 #include "support/seen_scene.h"
 
 namespace dccd {
@@ -105,10 +106,10 @@ Rays allRays(const SensorView& view, const CloudMapOptions& options) {
 class ByVoxels {
  public:
   explicit ByVoxels(const CloudMapOptions& options) : tree_(options.resolution_m) {
-    tree_.setProbHit(options.HIT);
-    tree_.setProbMiss(options.MISS);
-    tree_.setClampingThresMin(options.MIN);
-    tree_.setClampingThresMax(options.MAX);
+    tree_.setProbHit(tolerance::MAP_HIT);
+    tree_.setProbMiss(tolerance::MAP_MISS);
+    tree_.setClampingThresMin(tolerance::MAP_LEAST);
+    tree_.setClampingThresMax(tolerance::MAP_MOST);
   }
   void insert(const Keys& cleared, const Keys& filled) {
     for (const Key& key : cleared) {
