@@ -38,7 +38,7 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
   if (!given.isSet()) return;
   const bool is_one = given.kind == ParameterTree::Kind::TEXT;
   const std::vector<ParameterTree> items = is_one ? std::vector{given} : reader.list("obstacle_cloud_topic");
-  if (items.empty()) reader.fail(name, "is empty; remove it, or name the clouds' topic");
+  if (items.empty()) return;
   config.clouds.clear();
   std::set<std::string> topics;
   for (const ParameterTree& item : items) {
@@ -50,7 +50,6 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
     }
     config.clouds.push_back(readCloudSource(ParameterReader(entry, path)));
     const std::string& topic = config.clouds.back().topic;
-    if (topic.empty()) reader.fail(name, "is empty; remove it, or name the clouds' topic");
     if (!topics.insert(topic).second) reader.fail(name, "has '" + topic + "' twice; remove one of the two");
   }
   if (config.clouds.size() > MOST_CLOUD_TOPICS) {

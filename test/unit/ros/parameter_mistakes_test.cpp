@@ -147,7 +147,7 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"uncertainty: {scale: 3.0}", "~uncertainty/scale has no meaning without field"},
       {"topology: {source: file}", "topology/file"},
       {"clock_body: sleeve", "clock_body"},
-      {"obstacle_cloud_topic: []", "~obstacle_cloud_topic is empty"},
+      {"obstacle_cloud_topic: \"\"", "~obstacle_cloud_topic/0/topic is empty, a text is needed"},
       {"unknown_box: [0, 0, 0, 1, -1, 1]", "~unknown_box is empty"},
       {"bodies: {cloth: {topic: cloth}, finger: {rigid: {mesh: finger.stl, frame: finger}, self_collision: true}}",
        "rigid and cannot meet itself"},
