@@ -92,10 +92,10 @@ struct Late : WithRobot {
 };
 
 TEST_F(Late, TheLinksAreThereOnceTheDescriptionIs) {
-  lift(200, 0.1);
-  lift(200.1, 0.1);
-  send(mesh, meshStamped(tipAbove(0.3), 200));
-  EXPECT_EQ(moveTo(0.05, 200.1).touching, State::NEW);
+  lift(50, 0.1);
+  lift(50.1, 0.1);
+  send(mesh, meshStamped(tipAbove(0.3), 50));
+  EXPECT_EQ(moveTo(0.05, 50.1).touching, State::NEW);
 }
 
 struct Held : WithRobot {
