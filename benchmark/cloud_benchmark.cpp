@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/cloud_map.h"
+#include "dccd/tolerances.h"
 #include "support/seen_scene.h"
 #include "support/timing.h"
 

@@ -16,9 +16,7 @@
 #include <vector>
 
 #include "dccd/detect.h"
-#include "elementary/exact_decide.h"
 #include "elementary/exact_double_double.h"
-#include "elementary/exact_integer.h"
 #include "elementary/exact_tiers.h"
 #include "oracle/query_file.h"
 #include "simd/exact_batch.h"
@@ -31,29 +29,9 @@
 namespace dccd {
 namespace {
 
-enum LeftOut {
-  NOTHING,
-  COINCIDENCE,
-  BATCH,
-  IN_PLANE,
-  AXIS_MOTION,
-  SIMPLE_TIMES,
-  SUBDIVISION,
-  DOUBLE_DOUBLE,
-  FIXED_INTEGERS,
-  LAZY_INTEGERS,
-  COUNT
-};
-constexpr const char* NAMES[] = {"",
-                                 "coincidence",
-                                 "batch",
-                                 "in a plane",
-                                 "axis motion",
-                                 "simple times",
-                                 "subdivision",
-                                 "double-double",
-                                 "fixed integers",
-                                 "lazy integers"};
+enum LeftOut { NOTHING, COINCIDENCE, BATCH, IN_PLANE, AXIS_MOTION, SIMPLE_TIMES, DOUBLE_DOUBLE, FIXED_INTEGERS, COUNT };
+constexpr const char* NAMES[] = {
+    "", "coincidence", "batch", "in a plane", "axis motion", "simple times", "double-double", "fixed integers"};
 LeftOut left_out = NOTHING;
 bool was_asked[COUNT] = {};
 
@@ -86,9 +64,6 @@ DCCD_TIER(SimpleTime, "_ZN4dccd5exact18decideAtSimpleTime")
 DCCD_TIER(AlongAxis, "_ZN4dccd5exact15decideAlongAxis")
 DCCD_TIER(DoubleDouble, "_ZN4dccd5exact20decideByDoubleDouble")
 DCCD_TIER(FixedIntegers, "_ZN4dccd5exact21decideByFixedIntegers")
-DCCD_TIER(BigIntegers, "_ZN4dccd5exact19decideByBigIntegers")
-DCCD_WRAPPED(ElementaryResult, Subdivision, "_ZN4dccd5exact19decideBySubdivisionENS_8PairKindERKNS_10PairMotionE",
-             (PairKind kind, const PairMotion& pair))
 DCCD_WRAPPED(ElementaryResult, Bracket, "_ZN4dccd5exact19contactAtSimpleTimeENS_8PairKindERKNS_10PairMotionEddi",
              (PairKind kind, const PairMotion& pair, double low, double high, int toc_bits))
 DCCD_WRAPPED(std::int64_t, Cell, "_ZN4dccd5exact10cellOfRootERKNS0_16CoplanarityCubicEddi",
@@ -103,17 +78,6 @@ DCCD_LEFT_OUT(AlongAxis, AXIS_MOTION, exact::undecided(Tier::FIXED_INTEGER))
 DCCD_LEFT_OUT(DoubleDouble, DOUBLE_DOUBLE, exact::undecided(Tier::DOUBLE_DOUBLE))
 DCCD_LEFT_OUT(FixedIntegers, FIXED_INTEGERS, exact::undecided(Tier::FIXED_INTEGER))
 
-ElementaryResult byPlainIntegers(PairKind kind, const PairMotion& pair, int toc_bits) {
-  const exact::IntegerMotion motion(pair);
-  const exact::Answer answer = exact::Decision<BigInteger>(kind, motion, toc_bits).decide();
-  return answer.contact ? exact::contactInCell(answer.cell, toc_bits, Tier::BIG_INTEGER)
-                        : exact::noContact(Tier::BIG_INTEGER);
-}
-DCCD_LEFT_OUT(BigIntegers, LAZY_INTEGERS, byPlainIntegers(kind, pair, toc_bits))
-
-ElementaryResult wrappedSubdivision(PairKind kind, const PairMotion& pair) {
-  return isOut(SUBDIVISION) ? exact::undecided(Tier::BERNSTEIN) : realSubdivision(kind, pair);
-}
 ElementaryResult wrappedBracket(PairKind kind, const PairMotion& pair, double low, double high, int toc_bits) {
   return isOut(SIMPLE_TIMES) ? exact::undecided(Tier::FIXED_INTEGER) : realBracket(kind, pair, low, high, toc_bits);
 }

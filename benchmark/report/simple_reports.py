@@ -237,10 +237,8 @@ TIERS = {
     "in a plane": "all in a plane across an axis, at the start or throughout: doubles with proved bounds",
     "axis motion": "motion along one axis: integers of one or two words",
     "simple times": "features at rest, contacts at times such as 1/2 and 1/3, motion along one axis: the same integers",
-    "subdivision": "features that are apart while their polynomials vanish",
     "double-double": "nearly parallel edges, slivers, grazing features",
     "fixed integers": "degenerate pairs whose coordinates are of similar size",
-    "lazy integers": "coordinates of all sizes: integers of any width, computed where doubles cannot tell the sign; else all are",
 }
 GROUPS = {"steps": "real steps", "queries": "hard queries", "families": "hard families", "sheets": "sheets"}
 

@@ -149,9 +149,7 @@ DCCD_MARGIN double CUBIC_VALUE = 102 * HALF_ULP;                   ///< [1] of f
 DCCD_MARGIN double CUBIC_VALUE_PAIRS = 360 * HALF_ULP * HALF_ULP;  ///< [1] of f in pairs of doubles, times U V W
 DCCD_MARGIN double CUBIC_SLOPE = 656 * HALF_ULP;                   ///< [1] of f' in doubles, times U V W
 constexpr double BOUND_OF_BOUNDS = 1.0625;                         ///< [1] slack of a sum of such bounds, times it
-constexpr double TANGENT_VALUE = 4 * HALF_ULP;       ///< [1] slack of f along its tangent, of its value and its change
-DCCD_MARGIN double SUBDIVISION = 0x1p-50;            ///< [1] of the difference of two projections, times the largest
-constexpr double SUBDIVISION_UNDERFLOW = 0x1p-1070;  ///< [m] slack of the same, for what underflows
+constexpr double TANGENT_VALUE = 4 * HALF_ULP;  ///< [1] slack of f along its tangent, of its value and its change
 /// [1] Margin of a quadratic, times (radius + QUADRATIC_TIME), times its coefficients.
 DCCD_MARGIN double QUADRATIC_SIGN = 2.5;
 constexpr double QUADRATIC_TIME = 4 * HALF_ULP;   ///< [step] slack of the radius: 3 half ulps for the coefficients
@@ -161,17 +159,6 @@ constexpr double QUADRATIC_UNDERFLOW = 0x1p-990;  ///< [1] slack of the same, fo
 constexpr double ROOT_BRACKET = 0x1p-44;
 constexpr double CUBIC_SMALLEST_M3 = 0x1p-300, CUBIC_LARGEST_M3 = 0x1p300;  ///< [m^3] guard on the coefficients
 constexpr double TIME_GRID = 0x1p-52;  ///< [step] times are multiples of it, so that 1 - t is exact
-// Integers that are computed where they have to be (elementary/exact_lazy_integer.h). [1] Of numbers in [1/2, 1).
-constexpr double LAZY_ROUNDING = 0x1p-102;  ///< slack of a sum and of a product, below 2^-104
-constexpr int LAZY_FAR_BITS = 200;          ///< an addend smaller by 2^-200 goes into the error. Smaller: larger errors
-constexpr double LAZY_BOUND_OF_BOUNDS = 1.001;  ///< slack of a sum of errors, times it
-constexpr double LAZY_SIGN = 0.999;             ///< slack of a number that is compared with its error, times it
-/// Of a larger error the number is computed by GMP before others are made of it. Larger: signs are asked of GMP more
-/// often. Smaller: numbers are computed of which no sign is asked.
-constexpr double LAZY_SHARP = 0x1p-70;
-/// Of a larger error the number is computed before its double is taken, which has 2^-53 of its own. Larger: bounds on
-/// polynomials do not hold.
-constexpr double LAZY_DOUBLE = 0x1p-60;
 // Conservative advancement (elementary/conservative_advance.cpp).
 DCCD_MARGIN double ADVANCE_SEPARATION = 11 * HALF_ULP;  ///< [1] margin of n.w against d |n|, times |n|_1 M
 constexpr double CLOSING_SPEED = 0x1p-50;               ///< [1] slack of a closing speed times a bracket's width
@@ -252,6 +239,10 @@ constexpr unsigned long long MAP_NODE_BUILDING = 86, MAP_NODE = 70;
 /// of nodes included, of which it needs at most one of three: a list that grows, three times; a tree that is built and
 /// two surfaces.
 constexpr unsigned long long MAP_LEAF_ADDED = 200;
+/// [1] Probabilities that a voxel is occupied in which a point lies, and that a ray goes through; no voxel's is taken
+/// to be less, or more. octomap_server's. A larger hit or miss: fewer looks make an obstacle, more clear it. Nearer to
+/// 0 and 1: what has changed is seen later.
+constexpr double MAP_HIT = 0.7, MAP_MISS = 0.4, MAP_LEAST = 0.12, MAP_MOST = 0.97;
 /// [1] of a coordinate or a distance: what a body's own voxel must be nearer than own_voxels_m, for the rounding of the
 /// points that show it (some 20 units in the last place). Larger: voxels at the very rim are obstacles.
 constexpr double OWN_REACH = 0x1p-44;

@@ -15,7 +15,6 @@ ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_
   ElementaryResult result = decideByCoincidence(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideInPlane(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideAtSimpleTime(kind, pair, toc_bits);
-  if (result.verdict == Verdict::UNDECIDED) result = decideBySubdivision(kind, pair);
   if (result.verdict == Verdict::UNDECIDED) result = decideByDoubleDouble(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideByFixedIntegers(kind, pair, toc_bits);
   return result.verdict == Verdict::UNDECIDED ? decideByBigIntegers(kind, pair, toc_bits) : result;
@@ -32,7 +31,7 @@ constexpr std::chrono::microseconds TIME_FOR_BATCHES(100);
 /// A pair for which the batched tier has no complete answer.
 ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const BlockOutput& output, std::size_t i,
                         int toc_bits) {
-  // A pair takes up to a fifth of a millisecond from here on, and the clock some forty nanoseconds.
+  // A pair takes up to half a millisecond from here on, and the clock some forty nanoseconds.
   if (batch.deadline && batch.deadline->isOver()) return exact::undecided(Tier::DOUBLE_BATCH);
   const PairMotion pair = exact::motionOf(batch.vertices, batch.pairs[pair_index]);
   if (output.verdict[i] == simd::BATCH_YES_BRACKET) {

@@ -97,7 +97,6 @@ class Decision {
     result.c[1] =
         (u.start[i] * v.change[j] + u.change[i] * v.start[j]) - (u.start[j] * v.change[i] + u.change[j] * v.start[i]);
     result.c[2] = u.change[i] * v.change[j] - u.change[j] * v.change[i];
-    for (Z& c : result.c) c.sharpened();
     return result;
   }
 
@@ -120,7 +119,6 @@ class Decision {
       f.c[2] = f.c[2] + (n.c[1] * w.change[k] + n.c[2] * w.start[k]);
       f.c[3] = f.c[3] + n.c[2] * w.change[k];
     }
-    for (Z& c : f.c) c.sharpened();
     return f;
   }
 

@@ -38,7 +38,6 @@ class StackInteger {
   static StackInteger shifted(std::int64_t value, int shift) { return StackInteger(value) << shift; }
 
   int sign() const { return (size_ > 0) - (size_ < 0); }
-  const StackInteger& sharpened() const { return *this; }  // is exact; see exact_lazy_integer.h
 
   StackInteger operator-() const {
     StackInteger result(*this);
@@ -176,7 +175,6 @@ class BigInteger {
   static BigInteger shifted(std::int64_t value, int shift) { return BigInteger(value) << shift; }
 
   int sign() const { return sgn(value_); }
-  const BigInteger& sharpened() const { return *this; }
 
   BigInteger operator-() const { return BigInteger(mpz_class(-value_)); }
   BigInteger operator+(const BigInteger& other) const { return BigInteger(mpz_class(value_ + other.value_)); }

@@ -1,7 +1,7 @@
 #include <cstring>
 
 #include "elementary/exact_decide.h"
-#include "elementary/exact_lazy_integer.h"
+#include "elementary/exact_integer.h"
 #include "elementary/exact_tiers.h"
 
 namespace dccd {
@@ -59,9 +59,7 @@ ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, in
 }
 
 ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int toc_bits) {
-  const IntegerMotion motion(pair);
-  LazyInteger::beginDecision();
-  return decideByIntegers<LazyInteger>(kind, motion, toc_bits, Tier::BIG_INTEGER);
+  return decideByIntegers<BigInteger>(kind, IntegerMotion(pair), toc_bits, Tier::BIG_INTEGER);
 }
 
 }  // namespace exact

@@ -25,8 +25,6 @@ ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int 
 /// DOUBLE_DOUBLE, in doubles alone: points in a plane across an axis, throughout or at the start. Undecided for others,
 /// and where a vertex comes to an edge's end, or an edge's line at once.
 ElementaryResult decideInPlane(PairKind kind, const PairMotion& pair, int toc_bits);
-/// BERNSTEIN: only ever says NO_CONTACT.
-ElementaryResult decideBySubdivision(PairKind kind, const PairMotion& pair);
 /// DOUBLE_DOUBLE: roots bracketed within 2^-52; undecided where f is zero, or nearly, at an end of the step or an
 /// extremum, and where a feature's border is hit exactly.
 ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int toc_bits);

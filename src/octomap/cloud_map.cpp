@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "dccd/tolerances.h"
 #include "octomap/leaf_lists.h"
 #include "octomap/map_builder.h"
 #include "octomap/octree_update.h"

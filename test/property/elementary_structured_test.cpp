@@ -57,7 +57,6 @@ TEST(ElementaryStructured, FewWordsAreEnough) {
       const bool batch = test::decideByBatch(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
       const bool known = batch || exact::decideByCoincidence(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||
                          exact::decideInPlane(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||
-                         exact::decideBySubdivision(set.kind, pair).verdict != Verdict::UNDECIDED ||
                          exact::decideAtSimpleTime(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||
                          exact::decideByDoubleDouble(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
       ++(known ? settled : left);

@@ -38,14 +38,14 @@ ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair
       return exact::decideByCoincidence(kind, pair, toc_bits);
     case Tier::DOUBLE_BATCH:
       return decideByBatch(kind, pair, toc_bits);
-    case Tier::BERNSTEIN:
-      return exact::decideBySubdivision(kind, pair);
     case Tier::DOUBLE_DOUBLE:
       return exact::decideByDoubleDouble(kind, pair, toc_bits);
     case Tier::FIXED_INTEGER:
       return exact::decideByFixedIntegers(kind, pair, toc_bits);
     case Tier::BIG_INTEGER:
       return exact::decideByBigIntegers(kind, pair, toc_bits);
+    case Tier::BERNSTEIN:  // the rung conservative's
+      return exact::undecided(tier);
     case Tier::COUNT:
       break;
   }

@@ -206,26 +206,6 @@ MarginInput flatPair(RandomSource& random) {
   return pairOf(kind, x[0], x[1], x[2], random);
 }
 
-MarginInput cornerPair(RandomSource& random) {
-  PairMotion motion;
-  const int steps = 1 + static_cast<int>(random() % 127);  // the time times 128
-  for (int k = 0; k < 3; ++k) {
-    const double corner0 = heavy(random), corner1 = -corner0 * (1 + 0.125 * share(random));
-    // Ahead by 3 (1 - t) - ... : zero at the time, of either sign before and after.
-    const double unit = std::ldexp(static_cast<double>(1 + random() % 7), -50 + static_cast<int>(random() % 10));
-    const double side = k == 0 ? 1 : k == 1 ? -1 : 0;
-    motion.x[0][1][k] = corner0;
-    motion.x[1][1][k] = corner1;
-    motion.x[0][0][k] = corner0 + side * unit * steps;
-    motion.x[1][0][k] = corner1 - side * unit * (128 - steps);
-    for (int i = 2; i < 4; ++i) {  // the other corners lie further left
-      motion.x[0][i][k] = corner0 - 0.25 * share(random);
-      motion.x[1][i][k] = corner1 - 0.25 * share(random);
-    }
-  }
-  return inputOf(PairKind::VERTEX_FACE, motion);
-}
-
 void changeInFloat(MarginInput& input, RandomSource& random) {
   const std::size_t i = random() % 12;
   const double change = uniform(random) * std::ldexp(std::fabs(input.x[i]), -static_cast<int>(random() % 28));

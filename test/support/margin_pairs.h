@@ -28,8 +28,6 @@ MarginInput crossingPair(RandomSource& random, int closest);
 /// In one plane but for a height that makes f nearly a third power of t - r, so that its root is known badly, while the
 /// features sweep over each other's border in that plane.
 MarginInput flatPair(RandomSource& random);
-/// A vertex meets a corner of a face at a dyadic time, on its left along one axis before, along another one after.
-MarginInput cornerPair(RandomSource& random);
 /// A pair, and as the last number a time at which it is coplanar up to rounding.
 MarginInput pairAndTime(RandomSource& random);
 /// A pair, a distance and a tolerance.

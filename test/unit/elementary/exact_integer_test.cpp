@@ -6,7 +6,6 @@
 #include <random>
 
 #include "elementary/exact_integer.h"
-#include "elementary/exact_lazy_integer.h"
 
 namespace dccd {
 namespace {
@@ -18,20 +17,17 @@ using Fixed = StackInteger<LIMBS>;
 struct Twin {
   Fixed fixed;
   BigInteger big;
-  LazyInteger lazy;
 };
 
-Twin operator+(const Twin& a, const Twin& b) { return {a.fixed + b.fixed, a.big + b.big, a.lazy + b.lazy}; }
-Twin operator-(const Twin& a, const Twin& b) { return {a.fixed - b.fixed, a.big - b.big, a.lazy - b.lazy}; }
-Twin operator*(const Twin& a, const Twin& b) { return {a.fixed * b.fixed, a.big * b.big, a.lazy * b.lazy}; }
+Twin operator+(const Twin& a, const Twin& b) { return {a.fixed + b.fixed, a.big + b.big}; }
+Twin operator-(const Twin& a, const Twin& b) { return {a.fixed - b.fixed, a.big - b.big}; }
+Twin operator*(const Twin& a, const Twin& b) { return {a.fixed * b.fixed, a.big * b.big}; }
 
 void expectTwins(const Twin& a) {
   EXPECT_EQ(a.fixed.sign(), a.big.sign());
-  EXPECT_EQ(a.lazy.sign(), a.big.sign());
-  const ScaledDouble fixed = a.fixed.approximate(), big = a.big.approximate(), lazy = a.lazy.approximate();
+  const ScaledDouble fixed = a.fixed.approximate(), big = a.big.approximate();
   const double unscaled = std::ldexp(fixed.mantissa, static_cast<int>(fixed.exponent - big.exponent));
   EXPECT_NEAR(unscaled, big.mantissa, 0x1p-51);
-  EXPECT_NEAR(std::ldexp(lazy.mantissa, static_cast<int>(lazy.exponent - big.exponent)), big.mantissa, 0x1p-51);
   if (a.fixed.sign() != 0) {
     EXPECT_GE(std::fabs(fixed.mantissa), 0.5);
     EXPECT_LT(std::fabs(fixed.mantissa), 1.0);
@@ -41,18 +37,16 @@ void expectTwins(const Twin& a) {
 void expectZero(const Twin& a) {
   EXPECT_EQ(a.fixed.sign(), 0);
   EXPECT_EQ(a.big.sign(), 0);
-  EXPECT_EQ(a.lazy.sign(), 0);
 }
 
 /// Numbers with carries and borrows: powers of two, their neighbours, zero, sums of such, any sign.
 Twin randomTwin(std::mt19937_64& random, int most_bits) {
-  Twin sum{Fixed(0), BigInteger(0), LazyInteger(0)};
+  Twin sum{Fixed(0), BigInteger(0)};
   for (int i = static_cast<int>(random() % 4); i >= 0; --i) {
     const auto value = static_cast<std::int64_t>(random()) >> (random() % 64);
     const std::int64_t picked = random() % 3 == 0 ? (random() % 2 == 0 ? 1 : -1) : value;
     const int shift = static_cast<int>(random() % static_cast<unsigned>(most_bits - 64));
-    sum = sum +
-          Twin{Fixed::shifted(picked, shift), BigInteger::shifted(picked, shift), LazyInteger::shifted(picked, shift)};
+    sum = sum + Twin{Fixed::shifted(picked, shift), BigInteger::shifted(picked, shift)};
   }
   return sum;
 }
@@ -60,7 +54,6 @@ Twin randomTwin(std::mt19937_64& random, int most_bits) {
 TEST(ExactInteger, LawsOfArithmetic) {
   std::mt19937_64 random(1);
   for (int i = 0; i < 20000; ++i) {
-    LazyInteger::beginDecision();
     const Twin a = randomTwin(random, 300), b = randomTwin(random, 300), c = randomTwin(random, 300);
     expectZero((a + b) - b - a);
     expectZero((a - b) + (b - a));
@@ -76,16 +69,14 @@ TEST(ExactInteger, LawsOfArithmetic) {
 TEST(ExactInteger, SmallFactorsShiftsAndNegation) {
   std::mt19937_64 random(2);
   for (int i = 0; i < 20000; ++i) {
-    LazyInteger::beginDecision();
     const Twin a = randomTwin(random, 400);
     const auto factor = static_cast<std::int64_t>(random()) >> (random() % 64);
     const int shift = static_cast<int>(random() % 300);
-    const Twin by_factor{a.fixed * factor, a.big * factor, a.lazy * factor};
-    const Twin shifted{a.fixed << shift, a.big << shift, a.lazy << shift};
-    expectZero(by_factor - a * Twin{Fixed(factor), BigInteger(factor), LazyInteger(factor)});
-    expectZero(shifted -
-               a * Twin{Fixed::shifted(1, shift), BigInteger::shifted(1, shift), LazyInteger::shifted(1, shift)});
-    expectZero(a + Twin{-a.fixed, -a.big, -a.lazy});
+    const Twin by_factor{a.fixed * factor, a.big * factor};
+    const Twin shifted{a.fixed << shift, a.big << shift};
+    expectZero(by_factor - a * Twin{Fixed(factor), BigInteger(factor)});
+    expectZero(shifted - a * Twin{Fixed::shifted(1, shift), BigInteger::shifted(1, shift)});
+    expectZero(a + Twin{-a.fixed, -a.big});
     if (HasFailure()) return;
   }
 }
@@ -94,11 +85,10 @@ TEST(ExactInteger, SmallFactorsShiftsAndNegation) {
 TEST(ExactInteger, CancellationIsSeenThrough) {
   std::mt19937_64 random(3);
   for (int i = 0; i < 2000; ++i) {
-    LazyInteger::beginDecision();
     const auto value = static_cast<std::int64_t>(random() >> 11);
     const int far = static_cast<int>(random() % 4000);
-    const LazyInteger one(random() % 2 ? 1 : -1), large = LazyInteger::shifted(value + 1, far);
-    const LazyInteger next = large + one;
+    const BigInteger one(random() % 2 ? 1 : -1), large = BigInteger::shifted(value + 1, far);
+    const BigInteger next = large + one;
     EXPECT_EQ((next * next - large * large).sign(), one.sign()) << value << " 2^" << far;
     EXPECT_EQ(((large + next) - next - large).sign(), 0);
     EXPECT_EQ((next - large).approximate().exponent, 1);
@@ -124,7 +114,7 @@ TEST(ExactInteger, ProductsFillTheCapacity) {
 TEST(ExactInteger, ExtremesOfInt64) {
   for (const std::int64_t value : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max(),
                                    std::int64_t{0}, std::int64_t{-1}}) {
-    const Twin a{Fixed(value), BigInteger(value), LazyInteger(value)};
+    const Twin a{Fixed(value), BigInteger(value)};
     expectTwins(a);
     expectTwins(a * a);
     EXPECT_EQ(a.fixed.sign(), (value > 0) - (value < 0));

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "elementary/exact_lazy_integer.h"
+#include "elementary/exact_integer.h"
 #include "elementary/exact_roots.h"
 
 namespace dccd {
@@ -38,7 +38,7 @@ Cubic<Z> withRoots(Fraction a, Fraction b, Fraction c, std::int64_t factor) {
 
 template <class Z>
 class ExactRoots : public testing::Test {};
-using Integers = testing::Types<StackInteger<64>, BigInteger, LazyInteger>;
+using Integers = testing::Types<StackInteger<64>, BigInteger>;
 TYPED_TEST_SUITE(ExactRoots, Integers);
 
 TYPED_TEST(ExactRoots, RationalRootsOfEveryMultiplicityAndSign) {

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/cloud_map.h"
+#include "dccd/tolerances.h"
 #include "support/seen_scene.h"
 
 namespace dccd {
