@@ -39,8 +39,7 @@ LivenessLimits livenessLimits(const MonitorConfig& config);
 
 struct CollisionMonitor::Impl {
   ros::NodeHandle node, private_node;
-  tf2::BufferCore transforms;
-  TransformFeed feed{transforms};
+  TransformFeed feed;
   MonitorPipeline pipeline;
   // The pipeline's. The worker changes in it what can be changed live, which no other thread is to read.
   const MonitorConfig& config;
