@@ -63,8 +63,8 @@ TransformFeed::Sent TransformFeed::between(const Frame& frame, StampNs stamp_ns)
   const auto& [to_ns, other] = *next;
   if (frame.is_apart && one.sender != other.sender) return {};
   if (one.parent != other.parent) return one;
-  const double share = ros::Duration().fromNSec(stamp_ns - from_ns).toSec() /
-                       ros::Duration().fromNSec(to_ns - from_ns).toSec();
+  const double share =
+      ros::Duration().fromNSec(stamp_ns - from_ns).toSec() / ros::Duration().fromNSec(to_ns - from_ns).toSec();
   const auto turn = [](const Sent& sent) {
     const Eigen::Quaterniond& q = sent.pose.rotation;
     return tf2::Quaternion(q.x(), q.y(), q.z(), q.w());
@@ -162,7 +162,8 @@ std::string TransformFeed::whyNoWay(const std::string& target, const std::string
   std::string reason = "tf joined them otherwise then";
   forEachKeptOnWay([&](const Frame& frame) {
     const StampNs first_ns = frame.sent.front().first, newest_ns = frame.sent.back().first;
-    if (newest_ns < stamp_ns) reason = "the newest transform of " + quoted(frame.name) + " is of " + secondsOf(newest_ns);
+    if (newest_ns < stamp_ns)
+      reason = "the newest transform of " + quoted(frame.name) + " is of " + secondsOf(newest_ns);
     if (first_ns > stamp_ns) reason = "tf keeps nothing of " + quoted(frame.name) + " before " + secondsOf(first_ns);
   });
   return reason;

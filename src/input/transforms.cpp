@@ -45,7 +45,7 @@ std::string problemOf(const geometry_msgs::TransformStamped& transform) {
   const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
   const bool is_finite = std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
   if (is_finite && std::abs(norm2 - 1) < tolerance::TF_QUATERNION_NORM) return {};  // false with a NaN
-  std::ostringstream text;  // which takes as long as all else
+  std::ostringstream text;                                                          // which takes as long as all else
   if (!is_finite) {
     text << "its translation (" << p.x << ' ' << p.y << ' ' << p.z << ") is not finite";
     return text.str();

@@ -26,9 +26,9 @@ namespace dccd {
 
 constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
-/// Keeps what was sent and forgets what a publisher sent when its stamps jump back, as a looping replay makes them: kept
-/// transforms of the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that
-/// was elsewhere at a stamp before its newest tells it, as after a simulation's reset. Where the stamps of two
+/// Keeps what was sent and forgets what a publisher sent when its stamps jump back, as a looping replay makes them:
+/// kept transforms of the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame
+/// that was elsewhere at a stamp before its newest tells it, as after a simulation's reset. Where the stamps of two
 /// publishers of one frame are that far apart, what was sent of this frame is forgotten, each time, and nothing else. A
 /// frame that is on /tf and, elsewhere, on /tf_static has no place: tf2 would have it at rest where it was sent last,
 /// at all times. One that is sent elsewhere on /tf_static is there at all times from then on, and where it was before

@@ -207,7 +207,8 @@ TEST_F(TransformFeedTest, APublisherWhoseStampsGoBackForgetsWhatItSent) {
   EXPECT_EQ(pose.translation().x(), 0);
 }
 
-// What the node takes in 10 s analyze_bag takes in 70 s: the transforms of two humanoids, far more slowly than the limit.
+// What the node takes in 10 s analyze_bag takes in 70 s: the transforms of two humanoids, far more slowly than the
+// limit.
 TEST(TransformFeedLimit, IsOfARate) {
   TransformFeed feed(TransformWindow::length().toSec());
   tf2_msgs::TFMessage message;
