@@ -1,11 +1,14 @@
 // The whole step on scenes of one kind and many sizes: does the time per triangle grow? Contacts are compared between
-// thread counts before a time is written.
+// thread counts before a time is written. And the memory that a body in a stream takes.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "dccd/stream.h"
+#include "dccd/voxel_surface.h"
 #include "support/detector.h"
 #include "support/generated_scene.h"
 #include "support/timing.h"
@@ -82,6 +85,58 @@ nlohmann::json measure(const Frames& frames, int threads, int repeat, std::vecto
   return out;
 }
 
+/// What a stream may ask of a body, beside its contacts.
+struct Streamed {
+  std::string name;
+  bool moves = false, with_distances = false, with_own_voxels = false;
+};
+
+/// A cloth of 2 m, folded once with 2 cm between its layers, so that nothing certifies that it does not touch itself;
+/// all that a monitor holds of it after 40 frames, its mesh included. Distances are those from a map of 2 m, and own
+/// voxels of a map that shows the lower layer anew with each third frame.
+double bytesOf(const Streamed& asked, std::size_t side) {
+  ObstacleMap map;
+  if (asked.with_distances || asked.with_own_voxels) {
+    std::vector<OccupiedLeaf> leaves;
+    const auto z = static_cast<std::uint16_t>(32768 + (asked.with_own_voxels ? 25 : 0));
+    for (std::uint16_t i = 0; i < 100; ++i) {
+      for (std::uint16_t j = 0; j < 100; ++j) {
+        leaves.push_back({{static_cast<std::uint16_t>(32768 + i), static_cast<std::uint16_t>(32768 + j), z}, 1});
+      }
+    }
+    map.surface = VoxelSurface::build(0.02, leaves);
+  }
+  const std::size_t before = residentBytes();
+  Body body;
+  body.name = "cloth";
+  body.own_voxels_m = asked.with_own_voxels ? ONE_VOXEL : 0;
+  MonitorOptions options;
+  options.detector.clearance.wanted = asked.with_distances;
+  Monitor monitor(options, {body});
+  const auto topology = std::make_shared<const Topology>(Topology::grid(side, side));
+  Outcome outcome;
+  for (int k = 0; k < 40; ++k) {
+    MeshFrame frame;
+    frame.stamp_ns = 1000000000 + k * 33333333LL;
+    frame.topology = topology;
+    frame.positions.reserve(side * side);
+    for (std::size_t v = 0; v < side * side; ++v) {
+      const double edge_m = 2.0 / static_cast<double>(side - 1), x = edge_m * static_cast<double>(v % side);
+      const double y = edge_m * static_cast<double>(v / side), folded = std::min(x, 2 - x);
+      const double wave = 0.05 * std::sin(3 * folded + 2 * y + (asked.moves ? 0.01 * k : 0));
+      frame.positions.emplace_back(folded, y, 0.5 + wave + (x > 1 ? 0.02 : 0));
+    }
+    if (map.surface && (k == 0 || (asked.with_own_voxels && k % 3 == 0))) {
+      map.stamp_ns = frame.stamp_ns;
+      monitor.setMap(map);
+    }
+    monitor.push(0, std::move(frame), k);
+    while (monitor.next(k, outcome)) continue;
+  }
+  if (!outcome.answered) throw std::runtime_error(asked.name + " was not answered");
+  return static_cast<double>(residentBytes() - before) / static_cast<double>(topology->faces().size());
+}
+
 }  // namespace
 }  // namespace benchmarks
 }  // namespace dccd
@@ -110,6 +165,14 @@ int main(int argc, char** argv) {
         result["runs"].push_back(measure(frames, n, repeat, reference));
         std::cerr << result["runs"].back().dump() << '\n';
       }
+    }
+    const std::size_t side = 566;
+    for (const Streamed& one :
+         {Streamed{"at rest"}, Streamed{"at rest, with distances", false, true}, Streamed{"moves", true},
+          Streamed{"moves, with distances", true, true}, Streamed{"moves, with own voxels", true, false, true}}) {
+      result["memory"].push_back(
+          {{"body", one.name}, {"triangles", 2 * (side - 1) * (side - 1)}, {"bytes_a_triangle", bytesOf(one, side)}});
+      std::cerr << result["memory"].back().dump() << '\n';
     }
     std::ofstream(out) << result.dump(1) << '\n';
   } catch (const std::exception& e) {

@@ -170,6 +170,7 @@ def write_scaling(folder, result):
                      "%.0f" % r["bytes_a_triangle"]])
         series.setdefault(r["threads"], []).append((n, per_triangle))
     write_rows(os.path.join(folder, "scaling.csv"), header, rows)
+    held = [[r["body"], "%d" % r["triangles"], "%.0f" % r["bytes_a_triangle"]] for r in result["memory"]]
     plt = pyplot()
     figure, axis = plt.subplots(figsize=(6, 4))
     for threads, points in series.items():
@@ -185,7 +186,7 @@ def write_scaling(folder, result):
     return save(folder, "scaling", "# Growth with the number of triangles\n\nGenerated scene: %s. Candidates are those "
                 "out of the linear filter. Contacts are the same for every number of threads. Memory is what the detector "
                 "holds after its runs, contacts included.\n\n" % result["scene"] +
-                table(header, rows))
+                table(header, rows) + "\n\n## In a stream\n\n" + table(["a body", "triangles", "bytes a triangle"], held))
 
 
 def write_clouds(folder, result):

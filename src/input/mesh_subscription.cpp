@@ -16,8 +16,6 @@ namespace dccd {
 
 namespace {
 
-using topic_tools::ShapeShifter;
-
 // A topic that has been quiet so long may have lost its publisher. Asked about so often, and at once when the last
 // publisher has gone.
 constexpr std::int64_t SILENCE_NS = 1000000000, LOOK_NS = 500000000, LOST_LOOK_NS = 200000000;
@@ -63,8 +61,8 @@ void MeshSubscription::close() {
 void MeshSubscription::open(const MeshType* type) {
   close();
   ros::SubscribeOptions options;
-  options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
-      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onBytes(event); });
+  options.initByFullCallbackType<const ros::MessageEvent<RawMessage>&>(
+      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<RawMessage>& event) { onBytes(event); });
   if (type) {
     options.md5sum = type->md5;
     options.datatype = type->datatype;
@@ -93,21 +91,21 @@ void MeshSubscription::heard(const std::string& type) {
   heard_type_ = type;
 }
 
-void MeshSubscription::onBytes(const ros::MessageEvent<const ShapeShifter>& event) try {
+void MeshSubscription::onBytes(const ros::MessageEvent<RawMessage>& event) try {
   MeshMessage message;
   message.number = ++*came_;
   on_number_(message.number);
   message.sender = event.getPublisherName();
-  const ShapeShifter::ConstPtr bytes = event.getConstMessage();
-  message.datatype = bytes->getDataType();
+  RawMessage& raw = *event.getMessage();
+  message.datatype = std::move(raw.datatype);
   heard(message.datatype);
-  message.md5 = bytes->getMD5Sum();
+  message.md5 = std::move(raw.md5);
   const MeshType* type = findMeshType(message.datatype);
-  if (type && message.md5 != type->md5) message.definition = bytes->getMessageDefinition();
-  if (hasMemoryFor(bytes->size())) {
-    message.bytes = bytesOf(*bytes);
+  if (type && message.md5 != type->md5) message.definition = event.getConnectionHeader()["message_definition"];
+  if (hasMemoryFor(raw.bytes.size())) {
+    message.bytes = std::move(raw.bytes);
   } else {
-    message.no_memory = bytes->size();
+    message.no_memory = raw.bytes.size();
   }
   callback_(std::move(message));
 } catch (const std::exception& error) {

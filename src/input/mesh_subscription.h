@@ -13,9 +13,9 @@
 #include <ros/node_handle.h>
 #include <ros/subscribe_options.h>
 #include <ros/subscriber.h>
-#include <topic_tools/shape_shifter.h>
 
 #include "input/mesh_message.h"
+#include "input/raw_message.h"
 
 namespace dccd {
 
@@ -80,7 +80,7 @@ class MeshSubscription {
   void close();
   void attempt(const std::string& published_type);
   void heard(const std::string& type);
-  void onBytes(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
+  void onBytes(const ros::MessageEvent<RawMessage>& event);
   void onObject(const TypedMesh& object);
 };
 

@@ -3,10 +3,11 @@
 #include <iterator>
 #include <limits>
 
-#include <tf2/exceptions.h>
+#include <tf2/LinearMath/Quaternion.h>
 #include <Eigen/Geometry>
 
 #include "input/short_text.h"
+#include "input/transform_tracks.h"
 #include "input/transforms.h"
 
 namespace dccd {
@@ -18,12 +19,6 @@ constexpr std::size_t MAX_CHAIN = 1000;
 // Between two transforms that are further apart a frame may have gone anywhere. Frames that move slowly come once a
 // second.
 constexpr StampNs LONGEST_HOLE_NS = 2'000'000'000;
-
-ros::Time toTime(StampNs stamp_ns) {
-  ros::Time time;
-  time.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
-  return time;
-}
 
 }  // namespace
 
@@ -47,37 +42,36 @@ const TransformFeed::Frame* TransformFeed::disputedOnWay() const {
   return nullptr;
 }
 
-/// Where the frame's parent has it: a transform of this very stamp as it was sent, else what tf2 says.
+/// Where the frame's parent has it: a transform of this very stamp as it was sent, else between two.
 const TransformFeed::Sent& TransformFeed::sentAt(const Frame& frame, StampNs stamp_ns) const {
   if (!frame.is_static || *frame.is_static) return frame.fixed;
   if (frame.asked_change == change_ && frame.asked_ns == stamp_ns) return frame.asked;
-  frame.asked = Sent();
-  const bool is_newest = !frame.sent.empty() && frame.sent.rbegin()->first == stamp_ns;  // most of the time
-  const auto at = is_newest ? std::prev(frame.sent.end()) : frame.sent.find(stamp_ns);
-  std::string parent;
-  if (at != frame.sent.end()) {
-    frame.asked = at->second;
-  } else if (frame.is_apart) {
-    frame.asked = between(frame, stamp_ns);
-  } else if (buffer_._getParent(frame.name, toTime(stamp_ns), parent)) {
-    frame.asked = {frameOf(parent), poseOf(buffer_.lookupTransform(parent, frame.name, toTime(stamp_ns)).transform)};
-  }
+  const auto at = find(frame.sent, stamp_ns);
+  frame.asked = at != frame.sent.end() ? at->second : between(frame, stamp_ns);
+  frame.asked.pose.rotation.normalize();
   frame.asked_change = change_;
   frame.asked_ns = stamp_ns;
   return frame.asked;
 }
 
-/// As tf2 has it between two stamps; nowhere between those of two publishers, whose clocks may be apart.
+/// As tf2 has it between two stamps, bit for bit; of a frame of which something was forgotten nowhere between those of
+/// two publishers, whose clocks may be apart.
 TransformFeed::Sent TransformFeed::between(const Frame& frame, StampNs stamp_ns) {
-  const auto next = frame.sent.upper_bound(stamp_ns);
+  const auto next = after(frame.sent, stamp_ns);
   if (next == frame.sent.begin() || next == frame.sent.end()) return {};
-  const Sent &one = std::prev(next)->second, &other = next->second;
-  if (one.sender != other.sender) return {};
+  const auto& [from_ns, one] = *std::prev(next);
+  const auto& [to_ns, other] = *next;
+  if (frame.is_apart && one.sender != other.sender) return {};
   if (one.parent != other.parent) return one;
-  const StampNs from_ns = std::prev(next)->first;
-  const double share = static_cast<double>(stamp_ns - from_ns) / static_cast<double>(next->first - from_ns);
+  const double share =
+      ros::Duration().fromNSec(stamp_ns - from_ns).toSec() / ros::Duration().fromNSec(to_ns - from_ns).toSec();
+  const auto turn = [](const Sent& sent) {
+    const Eigen::Quaterniond& q = sent.pose.rotation;
+    return tf2::Quaternion(q.x(), q.y(), q.z(), q.w());
+  };
+  const tf2::Quaternion turned = tf2::slerp(turn(one), turn(other), share);
   return {one.parent,
-          {one.pose.rotation.slerp(share, other.pose.rotation).normalized(),
+          {{turned.w(), turned.x(), turned.y(), turned.z()},
            (1 - share) * one.pose.translation + share * other.pose.translation},
           one.sender};
 }
@@ -86,20 +80,10 @@ const TransformFeed::Frame* TransformFeed::newestParentOf(const Frame& frame) {
   return frame.sent.empty() ? frame.fixed.parent : frame.sent.rbegin()->second.parent;
 }
 
-/// The first of one that moves after the stamp. Most of the time that is none, or one of the newest.
-std::map<StampNs, TransformFeed::Sent>::const_iterator TransformFeed::after(const Frame& frame, StampNs stamp_ns) {
-  auto found = frame.sent.end();
-  for (int newest = 0; newest < 4 && found != frame.sent.begin(); ++newest) {
-    if (std::prev(found)->first <= stamp_ns) return found;
-    --found;
-  }
-  return frame.sent.upper_bound(stamp_ns);
-}
-
 /// As tf2 takes it between two stamps with other parents: the one before. Of what it does not know, the nearest.
 const TransformFeed::Frame* TransformFeed::parentAt(const Frame& frame, StampNs stamp_ns) {
   if (frame.sent.empty()) return frame.fixed.parent;
-  const auto next = after(frame, stamp_ns);
+  const auto next = after(frame.sent, stamp_ns);
   return (next == frame.sent.begin() ? next : std::prev(next))->second.parent;
 }
 
@@ -137,53 +121,52 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
   transform = Eigen::Isometry3d::Identity();
   if (target == source) return true;
   const std::lock_guard<std::mutex> lock(mutex_);
-  try {
-    const auto isDisputed = [&] {
-      const Frame* const frame = disputedOnWay();
-      if (frame) reason = "'" + shortText(frame->name, MAX_NAME) + "' is on /tf and, elsewhere, on /tf_static";
-      return frame != nullptr;
-    };
-    if (has_disputed_ && findWay(target, source, newestParentOf) && isDisputed()) return false;
-    // What tf2 knows of such a frame is out of date.
-    const bool is_way = has_apart_ && findWay(target, source, newestParentOf);
-    const Frame* const apart = has_apart_ ? firstApart() : nullptr;
-    if (apart && is_way && stamp_ns <= 0) {
-      StampNs newest_ns = std::numeric_limits<StampNs>::max();
-      forEachKeptOnWay([&](const Frame& frame) { newest_ns = std::min(newest_ns, frame.sent.rbegin()->first); });
-      stamp_ns = newest_ns;
-    }
-    Pose of_target, of_source;
-    // The newest common transform is tf2's to find, and so is the reason why there is none.
-    if (stamp_ns > 0 && findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
-      if (isDisputed()) return false;
-      of_target = poseAlong(from_target_);
-      of_source = poseAlong(from_source_);
-    } else if (apart) {
-      reason = "nothing is known of '" + shortText(apart->name, MAX_NAME) +
-               "' then; what was sent before is forgotten, as the stamps of ";
-      for (const auto& [sender, newest_ns] : apart->newest) {
-        reason += (sender == apart->newest.begin()->first ? "'" : "' and '") + shortText(sender, MAX_NAME);
-      }
-      reason += apart->newest.size() > 1 ? "', which both send it, are apart" : "' went back";
-      return false;
-    } else {
-      for (const std::string* name : {&target, &source}) {
-        reason = frameNameProblem(*name);
-        if (reason.empty()) continue;
-        reason = "'" + shortText(*name, MAX_NAME) + "' is no frame's name: " + reason;
-        return false;
-      }
-      if (!buffer_.canTransform(target, source, toTime(stamp_ns), &reason)) return false;
-      of_source = poseOf(buffer_.lookupTransform(target, source, toTime(stamp_ns)).transform);
-    }
-    const Eigen::Quaterniond back = of_target.rotation.conjugate();
-    transform.linear() = (back * of_source.rotation).normalized().toRotationMatrix();
-    transform.translation() = back * (of_source.translation - of_target.translation);
-    return transform.matrix().allFinite();
-  } catch (const tf2::TransformException& error) {
-    reason = error.what();
+  const auto isDisputed = [&] {
+    const Frame* const frame = disputedOnWay();
+    if (frame) reason = "'" + shortText(frame->name, MAX_NAME) + "' is on /tf and, elsewhere, on /tf_static";
+    return frame != nullptr;
+  };
+  if (has_disputed_ && findWay(target, source, newestParentOf) && isDisputed()) return false;
+  if (stamp_ns <= 0 && findWay(target, source, newestParentOf)) stamp_ns = newestOnWay();
+  if (!findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
+    reason = whyNoWay(target, source, stamp_ns);
     return false;
   }
+  if (isDisputed()) return false;
+  const Pose of_target = poseAlong(from_target_), of_source = poseAlong(from_source_);
+  const Eigen::Quaterniond back = of_target.rotation.conjugate();
+  transform.linear() = (back * of_source.rotation).normalized().toRotationMatrix();
+  transform.translation() = back * (of_source.translation - of_target.translation);
+  return transform.matrix().allFinite();
+}
+
+std::string TransformFeed::whyNoWay(const std::string& target, const std::string& source, StampNs stamp_ns) const {
+  const auto quoted = [](const std::string& name) { return "'" + shortText(name, MAX_NAME) + "'"; };
+  for (const std::string* name : {&target, &source}) {
+    const std::string problem = frameNameProblem(*name);
+    if (!problem.empty()) return quoted(*name) + " is no frame's name: " + problem;
+  }
+  const bool is_way = findWay(target, source, newestParentOf);
+  if (const Frame* const apart = has_apart_ ? firstApart() : nullptr) {
+    std::string reason =
+        "nothing is known of " + quoted(apart->name) + " then; what was sent before is forgotten, as the stamps of ";
+    for (const auto& [sender, newest_ns] : apart->newest) {
+      reason += (sender == apart->newest.begin()->first ? "'" : "' and '") + shortText(sender, MAX_NAME);
+    }
+    return reason + (apart->newest.size() > 1 ? "', which both send it, are apart" : "' went back");
+  }
+  for (const std::string* name : {&target, &source}) {
+    if (!frameOf(*name)) return "tf has no frame " + quoted(*name);
+  }
+  if (!is_way) return "tf does not join the two";
+  std::string reason = "tf joined them otherwise then";
+  forEachKeptOnWay([&](const Frame& frame) {
+    const StampNs first_ns = frame.sent.front().first, newest_ns = frame.sent.back().first;
+    if (newest_ns < stamp_ns)
+      reason = "the newest transform of " + quoted(frame.name) + " is of " + secondsOf(newest_ns);
+    if (first_ns > stamp_ns) reason = "tf keeps nothing of " + quoted(frame.name) + " before " + secondsOf(first_ns);
+  });
+  return reason;
 }
 
 /// With each frame that moves on the way that was found last.
@@ -194,6 +177,19 @@ void TransformFeed::forEachKeptOnWay(Take take) const {
       if (!(*chain)[i]->sent.empty()) take(*(*chain)[i]);
     }
   }
+}
+
+/// The most there is where none moves.
+StampNs TransformFeed::newestOnWay() const {
+  StampNs newest_ns = std::numeric_limits<StampNs>::max();
+  forEachKeptOnWay([&](const Frame& frame) { newest_ns = std::min(newest_ns, frame.sent.back().first); });
+  return newest_ns;
+}
+
+std::optional<StampNs> TransformFeed::newestStamp(const std::string& target, const std::string& source) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const StampNs newest_ns = findWay(target, source, newestParentOf) ? newestOnWay() : 0;
+  return newest_ns > 0 && newest_ns < std::numeric_limits<StampNs>::max() ? std::optional(newest_ns) : std::nullopt;
 }
 
 std::optional<TransformFeed::Ahead> TransformFeed::mostAhead(const std::string& target,
@@ -222,7 +218,7 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
       const std::size_t found_before = stamps.size();
       const Frame *const parent = parentAt(frame, end_ns), *before = nullptr;
       StampNs since_ns = from_ns;
-      auto one = after(frame, end_ns);
+      auto one = after(frame.sent, end_ns);
       const auto followsGap = [&](auto sample) {
         return sample != frame.sent.begin() &&
                (sample->second.gap || sample->first - std::prev(sample)->first > LONGEST_HOLE_NS);
@@ -267,7 +263,7 @@ std::string TransformFeed::doubtNextTo(const std::string& target, const std::str
   std::string doubt;
   if (!findWay(target, source, [&](const Frame& frame) { return parentAt(frame, stamp_ns); })) return doubt;
   forEachKeptOnWay([&](const Frame& frame) {
-    const auto next = after(frame, stamp_ns);
+    const auto next = after(frame.sent, stamp_ns);
     if (next == frame.sent.begin() || !doubt.empty()) return;
     const auto at = std::prev(next);
     const bool is_sent = at->first == stamp_ns, has_next = next != frame.sent.end();

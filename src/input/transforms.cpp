@@ -42,13 +42,14 @@ std::string problemOf(const geometry_msgs::TransformStamped& transform) {
   if (const std::string problem = frameNameProblem(child); !problem.empty()) return "child_frame_id: " + problem;
   if (const std::string problem = frameNameProblem(parent); !problem.empty()) return "frame_id: " + problem;
   if (child == parent) return "it is its own parent";
-  std::ostringstream text;
-  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+  const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+  const bool is_finite = std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+  if (is_finite && std::abs(norm2 - 1) < tolerance::TF_QUATERNION_NORM) return {};  // false with a NaN
+  std::ostringstream text;                                                          // which takes as long as all else
+  if (!is_finite) {
     text << "its translation (" << p.x << ' ' << p.y << ' ' << p.z << ") is not finite";
     return text.str();
   }
-  const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-  if (std::abs(norm2 - 1) < tolerance::TF_QUATERNION_NORM) return {};  // false with a NaN
   text << "its rotation x y z w (" << q.x << ' ' << q.y << ' ' << q.z << ' ' << q.w << ") has the length "
        << std::sqrt(norm2) << "; publish a quaternion of length 1";
   return text.str();
@@ -56,8 +57,8 @@ std::string problemOf(const geometry_msgs::TransformStamped& transform) {
 
 }  // namespace
 
-TransformFeed::TransformFeed(tf2::BufferCore& buffer)
-    : buffer_(buffer), max_kept_(static_cast<std::size_t>(MAX_KEPT * buffer.getCacheLength().toSec() / 10)) {}
+TransformFeed::TransformFeed(double kept_s)
+    : kept_ns_(std::llround(1e9 * kept_s)), max_kept_(static_cast<std::size_t>(MAX_KEPT * kept_s / 10)) {}
 
 const TransformFeed::Frame* TransformFeed::frameOf(const std::string& name) const {
   const auto found = frames_.find(name);
@@ -88,13 +89,13 @@ TransformFeed::Jump TransformFeed::jumpOf(const Frame* frame, StampNs stamp_ns, 
     const bool went_back = its_newest != frame->newest.end() && stamp_ns < its_newest->second - JUMP_BACK_NS;
     return went_back ? Jump::LOOP : Jump::TWO_SENDERS;
   }
-  const auto at_stamp = frame->sent.find(stamp_ns);
+  const auto at_stamp = find(frame->sent, stamp_ns);
   if (at_stamp == frame->sent.end()) return Jump::NONE;
   if (isSame(at_stamp->second, now, tolerance::SAME_PLACE)) return Jump::NONE;
   return *at_stamp->second.sender == sender ? Jump::LOOP : Jump::TWO_SENDERS;
 }
 
-/// What was sent of one that moves. tf2 forgets all frames or none.
+/// What was sent of one that moves.
 void TransformFeed::forget(Frame& frame) {
   kept_count_ -= frame.sent.size();
   ++frame.times_forgotten;
@@ -138,27 +139,24 @@ void TransformFeed::beginAnew(StampNs stamp_ns) {
   }
 }
 
-/// Else it is kept, and those are forgotten that the buffer forgets with it.
+/// Else it is kept, and those are forgotten that are too old beside it.
 bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame) {
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
   const auto newest = frame.newest.try_emplace(*sent.sender, stamp_ns).first;
   newest->second = std::max(newest->second, stamp_ns);
-  const std::size_t before = frame.sent.size();
-  const auto at = frame.sent.emplace_hint(frame.sent.end(), stamp_ns, sent);
-  if (frame.sent.size() == before) return true;
-  const auto next = std::next(at);
+  if (find(frame.sent, stamp_ns) != frame.sent.end()) return true;
+  const auto at = frame.sent.insert(after(frame.sent, stamp_ns), {stamp_ns, sent}), next = std::next(at);
   const bool passed_over = next == frame.sent.end() ? std::exchange(frame.passed_over, false) : next->second.gap;
   const bool lost = std::exchange(frame.lost, lost_) != lost_;
   at->second.gap = passed_over || lost;
-  const StampNs oldest_ns = frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec());
-  for (; frame.sent.begin()->first < oldest_ns; frame.is_cut = true) frame.sent.erase(frame.sent.begin());
-  kept_count_ += frame.sent.size() - before;
+  ++kept_count_;
+  const StampNs oldest_ns = frame.sent.rbegin()->first - kept_ns_;
+  for (; frame.sent.begin()->first < oldest_ns; frame.is_cut = true) frame.sent.pop_front(), --kept_count_;
   return false;
 }
 
 /// Keeps static transforms.
 void TransformFeed::clear() {
-  buffer_.clear();
   for (auto& named : frames_) {
     ++named.second.times_forgotten;
     named.second.sent.clear();
@@ -268,6 +266,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
         frame->fixed_since = change_;
       }
       frame->fixed = sent;
+      frame->fixed.pose.rotation.normalize();
     } else {
       const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
       const Jump jump = jumpOf(frame, stamp_ns, sent, its_sender);
@@ -279,14 +278,12 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static, cons
       if (jump == Jump::TWO_SENDERS) forget(*frame);
       if (jump == Jump::LOOP) forgetAllOf(*sent.sender);
       if (isRepeated(transform, sent, *frame)) {
-        if (!isSame(frame->sent.at(stamp_ns), sent, tolerance::SAME_PLACE)) passOver(transform);
+        if (!isSame(find(frame->sent, stamp_ns)->second, sent, tolerance::SAME_PLACE)) passOver(transform);
         continue;
       }
       // What was sent for a time after this one is forgotten. Up to the next one nobody knows where the frame went.
       frame->passed_over = frame->passed_over || hides_later;
-      if (frame->is_apart) continue;
     }
-    buffer_.setTransform(transform, "tf", is_static);
   }
   return cleared;
 }
@@ -314,7 +311,7 @@ void TransformFeed::passOver(const geometry_msgs::TransformStamped& transform) {
     frame.fixed_since = change_;
   }
   const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
-  const auto at = frame.sent.find(stamp_ns), next = frame.sent.upper_bound(stamp_ns);
+  const auto at = find(frame.sent, stamp_ns), next = after(frame.sent, stamp_ns);
   if (at != frame.sent.end()) at->second.gap = true;
   (next == frame.sent.end() ? frame.passed_over : next->second.gap) = true;
 }
@@ -325,11 +322,11 @@ void TransformFeed::dispute(const geometry_msgs::TransformStamped& transform, Fr
   leaveOut(transform, "it is on /tf and, elsewhere, on /tf_static; stop one of the two and start the monitor anew");
 }
 
-/// Its rotation has the length 1.
+/// As it was sent: its rotation has nearly the length 1.
 TransformFeed::Pose TransformFeed::poseOf(const geometry_msgs::Transform& transform) {
   const auto& q = transform.rotation;
   const auto& p = transform.translation;
-  return {Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized(), Vec3(p.x, p.y, p.z)};
+  return {Eigen::Quaterniond(q.w, q.x, q.y, q.z), Vec3(p.x, p.y, p.z)};
 }
 
 }  // namespace dccd

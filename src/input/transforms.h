@@ -1,9 +1,12 @@
-// Transforms: what arrives on /tf goes into one buffer; what is asked for comes out at exactly the stamp asked.
+// Transforms: what arrives on /tf is kept; what is asked for comes out at exactly the stamp asked.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -13,7 +16,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "dccd/mesh_store.h"
@@ -24,9 +26,9 @@ namespace dccd {
 
 constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
-/// Feeds a tf2 buffer and forgets what a publisher sent when its stamps jump back, as a looping replay makes them: kept
-/// transforms of the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame that
-/// was elsewhere at a stamp before its newest tells it, as after a simulation's reset. Where the stamps of two
+/// Keeps what was sent and forgets what a publisher sent when its stamps jump back, as a looping replay makes them:
+/// kept transforms of the end would otherwise be taken for ones of the beginning. Where they go back by less, a frame
+/// that was elsewhere at a stamp before its newest tells it, as after a simulation's reset. Where the stamps of two
 /// publishers of one frame are that far apart, what was sent of this frame is forgotten, each time, and nothing else. A
 /// frame that is on /tf and, elsewhere, on /tf_static has no place: tf2 would have it at rest where it was sent last,
 /// at all times. One that is sent elsewhere on /tf_static is there at all times from then on, and where it was before
@@ -34,17 +36,18 @@ constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 /// thread may call it.
 class TransformFeed {
  public:
-  /// tf2 forgets no name; further frames are left out.
+  /// No name is forgotten; further frames are left out.
   static constexpr std::size_t MAX_FRAMES = 16384;
-  /// Of all frames together, in each 10 s that the buffer keeps: 26,000 a second. Where more come all are forgotten.
-  static constexpr std::size_t MAX_KEPT = std::size_t{1} << 18;
+  /// Of all frames together, in each 10 s that are kept: 52,000 a second. Where more come all are forgotten.
+  static constexpr std::size_t MAX_KEPT = std::size_t{1} << 19;
   /// Further publishers count as one.
   static constexpr std::size_t MAX_SENDERS = 64;
 
   /// Child frames with unusable transforms that are told of.
   static constexpr std::size_t MAX_TOLD = 16;
 
-  explicit TransformFeed(tf2::BufferCore& buffer);
+  /// How long what was sent is kept, by its stamps.
+  explicit TransformFeed(double kept_s = 10);
   /// What these bytes of the topic are. Null where they do not hold what they say, which is counted as unusable.
   tf2_msgs::TFMessage::ConstPtr read(const std::string& topic, std::vector<std::uint8_t> bytes);
   /// A message of the topic could not be taken.
@@ -73,6 +76,8 @@ class TransformFeed {
                                      StampNs to_ns, std::vector<NewParent>& changes) const;
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
   std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
+  /// Until when, likewise.
+  std::optional<StampNs> newestStamp(const std::string& target, const std::string& source) const;
 
   /// Why source may have been elsewhere in target at the stamp than lookup() says, as far as what was sent next to it
   /// tells: at the stamp it was sent elsewhere, too, between two transforms its parent changed, or these are of two
@@ -108,7 +113,7 @@ class TransformFeed {
 
  private:
   struct Pose {
-    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< in `sent` as it came, else of length 1
     Vec3 translation = Vec3::Zero();
   };
   struct Frame;
@@ -118,16 +123,17 @@ class TransformFeed {
     const std::string* sender = nullptr;  ///< its place in senders_
     bool gap = false;  ///< something came for a time between the one before and this, and is not used
   };
-  /// One that tf has named. What the buffer holds of it is here as well, by numbers.
+  using Samples = std::deque<std::pair<StampNs, Sent>>;  ///< ascending
+  /// One that tf has named.
   struct Frame {
     std::string name;
     std::optional<bool> is_static;  ///< as tf2 takes it, for good, from what came first; none: it is a parent alone
-    std::map<StampNs, Sent> sent;   ///< of one that moves
+    Samples sent;                   ///< of one that moves
     Sent fixed;                     ///< of one that is static
     std::uint64_t fixed_since = 0;  ///< change_ when that was sent elsewhere; 0: it was not
     std::map<std::string, StampNs> newest;  ///< of each publisher; 0: it went back
     bool is_cut = false;                    ///< older ones were sent
-    bool is_apart = false;                  ///< some were forgotten that the buffer holds; it gets no more
+    bool is_apart = false;                  ///< some were forgotten, of this frame alone
     bool passed_over = false;               ///< something came for a time after the newest, and is not used
     std::uint64_t lost = 0;                 ///< lost_ when the newest came
     bool is_disputed = false;               ///< it is on both topics, and not at one place
@@ -143,11 +149,11 @@ class TransformFeed {
   /// From a frame up to an ancestor, the frame first and the ancestor last.
   using Chain = std::vector<const Frame*>;
 
-  tf2::BufferCore& buffer_;
   mutable std::mutex mutex_;
-  std::unordered_map<std::string, Frame> frames_;  // no more than the buffer forgets; places stay
+  std::unordered_map<std::string, Frame> frames_;  // places stay
   std::uint64_t change_ = 1;                       // counts what was added
   mutable Chain from_target_, from_source_;        // buffers of a question
+  StampNs kept_ns_;
   std::size_t kept_count_ = 0, max_kept_;
   std::uint64_t lost_ = 0;  // messages of /tf of which nobody knows what was in them
   std::set<std::string> senders_;
@@ -173,12 +179,17 @@ class TransformFeed {
   const Frame* firstApart() const;
   static Sent between(const Frame& frame, StampNs stamp_ns);
   static const Frame* newestParentOf(const Frame& frame);
-  static std::map<StampNs, Sent>::const_iterator after(const Frame& frame, StampNs stamp_ns);
+  template <class Sequence>
+  static auto after(Sequence& sent, StampNs stamp_ns);
+  template <class Sequence>
+  static auto find(Sequence& sent, StampNs stamp_ns);
   static const Frame* parentAt(const Frame& frame, StampNs stamp_ns);
   bool isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame);
   void clear();
   void leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem);
   const Sent& sentAt(const Frame& frame, StampNs stamp_ns) const;
+  StampNs newestOnWay() const;
+  std::string whyNoWay(const std::string& target, const std::string& source, StampNs stamp_ns) const;
   template <class ParentOf>
   bool findWay(const std::string& target, const std::string& source, ParentOf parentOf) const;
   static Pose poseOf(const geometry_msgs::Transform& transform);
@@ -186,6 +197,24 @@ class TransformFeed {
   template <class Take>
   void forEachKeptOnWay(Take take) const;
 };
+
+/// The first one after the stamp. Most of the time that is none, or one of the newest.
+template <class Sequence>
+auto TransformFeed::after(Sequence& sent, StampNs stamp_ns) {
+  auto found = sent.end();
+  for (int newest = 0; newest < 4 && found != sent.begin(); ++newest, --found) {
+    if (std::prev(found)->first <= stamp_ns) return found;
+  }
+  const auto isBefore = [](StampNs stamp_ns, const auto& sample) { return stamp_ns < sample.first; };
+  return std::upper_bound(sent.begin(), found, stamp_ns, isBefore);
+}
+
+/// The one of this stamp, or the end.
+template <class Sequence>
+auto TransformFeed::find(Sequence& sent, StampNs stamp_ns) {
+  const auto next = after(sent, stamp_ns);
+  return next != sent.begin() && std::prev(next)->first == stamp_ns ? std::prev(next) : sent.end();
+}
 
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions);
 Positions transformed(const Eigen::Isometry3d& target_from_source, const Positions& positions);

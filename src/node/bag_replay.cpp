@@ -50,8 +50,7 @@ struct BagReplay::Run {
   const Variation& variation;
   const std::string intended_topic;
   const OpenBags bags;
-  tf2::BufferCore transforms{TransformWindow::length()};
-  TransformFeed feed{transforms};
+  TransformFeed feed{TransformWindow::length().toSec()};
   MonitorPipeline pipeline;
   const MapMemory memory{pipeline.config()};
   MapOdds odds;
@@ -236,13 +235,9 @@ struct BagReplay::Run {
     if (body == clock || pipeline.isStatic(body)) return 0;
     const BodyConfig& config = pipeline.config().bodies[body];
     if (!config.isRigid()) return (last_came[body] - last_came[clock]).toSec();
-    try {
-      const ros::Time newest =
-          transforms.lookupTransform(pipeline.fixedFrame(), config.tf_frame, ros::Time(0)).header.stamp;
-      return (std::min(newest, end) - last_came[clock]).toSec();
-    } catch (const tf2::TransformException&) {
-      return 0;  // the frames say what is missing
-    }
+    const std::optional<StampNs> newest_ns = feed.newestStamp(pipeline.fixedFrame(), config.tf_frame);
+    if (!newest_ns) return 0;  // the frames say what is missing
+    return (std::min(toRosTime(*newest_ns), end) - last_came[clock]).toSec();
   }
 
   /// Of that time nothing is looked at: steps are those of the clock body. It counts where a pause between two frames

@@ -111,9 +111,9 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   queue.push(body, std::move(message));
 }
 
-void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<const ShapeShifter>& event, bool is_static) try {
+void CollisionMonitor::Impl::onTransforms(const ros::MessageEvent<RawMessage>& event, bool is_static) try {
   if (tf_drops[is_static].mayLack(input_callbacks)) feed.lose(is_static);
-  const auto message = feed.read(is_static ? "/tf_static" : "/tf", bytesOf(*event.getConstMessage()));
+  const auto message = feed.read(is_static ? "/tf_static" : "/tf", std::move(event.getMessage()->bytes));
   const auto arrival_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   if (message) feed.add(*message, is_static, event.getPublisherName(), arrival_ns);
   for (const std::string& line : feed.takeProblems()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
@@ -193,7 +193,7 @@ void CollisionMonitor::Impl::subscribe() {
   }
   const auto listenTo = [&](const std::string& topic, bool is_static) {
     ros::SubscribeOptions options;
-    using Event = const ros::MessageEvent<const ShapeShifter>&;
+    using Event = const ros::MessageEvent<RawMessage>&;
     options.initByFullCallbackType<Event>(topic, SUBSCRIBER_QUEUE,
                                           [this, is_static](Event event) { onTransforms(event, is_static); });
     options.md5sum = ros::message_traits::md5sum<tf2_msgs::TFMessage>();

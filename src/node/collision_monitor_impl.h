@@ -39,8 +39,7 @@ LivenessLimits livenessLimits(const MonitorConfig& config);
 
 struct CollisionMonitor::Impl {
   ros::NodeHandle node, private_node;
-  tf2::BufferCore transforms;
-  TransformFeed feed{transforms};
+  TransformFeed feed;
   MonitorPipeline pipeline;
   // The pipeline's. The worker changes in it what can be changed live, which no other thread is to read.
   const MonitorConfig& config;
@@ -101,7 +100,7 @@ struct CollisionMonitor::Impl {
   void subscribe();
   void onMeshNumber(std::size_t body, std::uint64_t number);
   void onMesh(std::size_t body, MeshMessage message);
-  void onTransforms(const ros::MessageEvent<const topic_tools::ShapeShifter>& event, bool is_static);
+  void onTransforms(const ros::MessageEvent<RawMessage>& event, bool is_static);
   void onIntended(const topic_tools::ShapeShifter::ConstPtr& message);
   void complainOfIntended(const std::string& problem);                         ///< the worker's
   void onMap(std::size_t source, const ros::MessageEvent<RawMessage>& event);  ///< of the maps' thread, as what follows

@@ -1,5 +1,6 @@
 #include "report/words.h"
 
+#include <algorithm>
 #include <set>
 #include <sstream>
 
@@ -17,10 +18,14 @@ std::string csvField(const std::string& text) {
 }
 
 std::string insideInWords(const Outcome& outcome) {
+  const auto isInside = [](const StartIntersection& one) {
+    return one.vertex[1] == NO_INDEX && one.body[1] != OBSTACLE_BODY;
+  };
+  if (std::none_of(outcome.intersections.begin(), outcome.intersections.end(), isInside)) return "";  // of most steps
   std::set<std::array<std::uint16_t, 2>> told;
   std::ostringstream text;
   for (const StartIntersection& one : outcome.intersections) {
-    if (one.vertex[1] != NO_INDEX || one.body[1] == OBSTACLE_BODY || !told.insert(one.body).second) continue;
+    if (!isInside(one) || !told.insert(one.body).second) continue;
     const std::vector<Body>& bodies = outcome.step->bodies;
     const Body& closed = bodies[one.body[1]];
     Box box;

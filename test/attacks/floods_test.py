@@ -64,10 +64,10 @@ class FloodsTest(AttackTest):
         self.holds(2)
 
     def test_stamps_of_transforms(self):
-        """With --long 300,000 of them, a nanosecond apart."""
+        """With --long 600,000 of them, a nanosecond apart."""
         self.start('tf_stamps')
         tf = self.advertise('/tf', TFMessage)
-        for i in range(100 if LONG else 10):  # of 262,144 all are forgotten
+        for i in range(200 if LONG else 10):  # of 524,288 all are forgotten
             batch = []
             for k in range(3000):
                 one = TransformStamped(child_frame_id='camera')

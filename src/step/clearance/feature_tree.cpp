@@ -64,6 +64,8 @@ void FeatureTree::build(const SceneBody& body, const Positions& positions) {
     }
     node.vertices_end = static_cast<std::uint32_t>(leaf_slots_.size());
   }
+  nodes_.shrink_to_fit();
+  leaf_slots_.shrink_to_fit();
   boxes_.resize(nodes_.size());
   built_ = true;
 }

@@ -45,6 +45,8 @@ void FacesSharing::build(const ClusterTree& faces, const SlotsAtVertex& at, Inde
     begin.push_back(static_cast<std::uint32_t>(others.size()));
   }
   others.resize(others.size() + 8);
+  others.shrink_to_fit();
+  pairs.shrink_to_fit();
 }
 
 void FacesSharing::leaveOut(const std::vector<std::uint8_t>& owns) {
@@ -91,6 +93,7 @@ void Fans::build(const SlotsAtVertex& faces, const std::vector<std::uint8_t>& co
     }
     begin.push_back(static_cast<std::uint32_t>(corners.size() / simd::GROUP));
   }
+  corners.shrink_to_fit();
 }
 
 /// Faces that need not stand for an edge, as many as are soon found: no two of them share one. By slots; which they are

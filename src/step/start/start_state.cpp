@@ -96,8 +96,12 @@ std::vector<StartIntersection> StartStateSearch::run(const SceneArrays& scene, b
       wanted.most_found == FoundLimit::NONE ? FoundLimit::NONE : std::size_t{tolerance::MAX_SUPERCLUSTER_PAIRS};
   has_deadline_ = deadline.canEnd();
   if (!(continues && known_)) clear();
-  for (std::size_t b = 0; b < neighbourhoods_.size() && found_.empty() && candidates_.empty(); ++b) {
-    if (scene.bodies()[b].rests == RESTS) neighbourhoods_[b] = Neighbourhood();
+  unsearched_ = searched_ ? unsearched_ + 1 : 0;
+  if (unsearched_ == RESTS && found_.empty() && candidates_.empty()) {
+    // Of a stream that goes on little is asked, of what is around contacts, and that is soon learnt again.
+    neighbourhoods_ = std::vector<Neighbourhood>();
+    near_ = std::vector<float>();
+    views_ = std::vector<std::uint32_t>();
   }
   testCandidates(scene, deadline);
   if (!searched_ && !hasEnough()) search(scene, deadline, threads, parallel);

@@ -131,9 +131,10 @@ class StartStateSearch {
   bool cut_ = false;  // there was more to find than most_found_
   const std::vector<Unfolded>* unfolded_ = nullptr;
   std::size_t most_found_ = FoundLimit::NONE, most_group_pairs_ = FoundLimit::NONE;
-  bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
-  bool searched_ = false;   // the search has come to its end
-  BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the units,
+  bool known_ = false;       // all contacts since the last run(): what that found out can be carried over
+  bool searched_ = false;    // the search has come to its end
+  unsigned unsearched_ = 0;  // steps on end that needed none
+  BodyPair next_bodies_{};   // else where it goes on: pairs of bodies are taken in order, in them the units,
   std::uint32_t next_unit_ = 0;
   std::vector<std::uint8_t> by_faces_;  // per body, by which it is searched
   std::vector<float> near_;             // vertices at t=0, of such bodies: simd::NearVertices,

@@ -82,8 +82,7 @@ TEST(Soak, FlatMemoryAndTheSameBytesForTheSameStep) {
   const bool is_long = test::longRun();
   const std::size_t frames = is_long ? 100000 : 1000, period = is_long ? 1000 : 100;
   const MonitorConfig config = configuration();
-  tf2::BufferCore transforms;
-  TransformFeed feed(transforms);
+  TransformFeed feed;
   MonitorPipeline pipeline(config, feed);
   FlightRecorder recorder(3, "/nonexistent");  // nothing is a surprise here, so nothing is written
   pipeline.monitor().setListener(&recorder);

@@ -2,6 +2,7 @@
 #include "input/transforms.h"
 
 #include <gtest/gtest.h>
+#include <tf2/buffer_core.h>
 
 #include <cmath>
 #include <cstring>
@@ -28,7 +29,7 @@ geometry_msgs::TransformStamped sent(const std::string& parent, const std::strin
 class Transforms : public ::testing::Test {
  protected:
   tf2::BufferCore buffer;
-  TransformFeed feed{buffer};
+  TransformFeed feed;
   std::mt19937_64 random{7};
   std::string reason;
 
@@ -36,6 +37,7 @@ class Transforms : public ::testing::Test {
     tf2_msgs::TFMessage message;
     message.transforms.push_back(transform);
     feed.add(message, is_static);
+    buffer.setTransform(transform, "test", is_static);
   }
   Vec3 place() {
     std::normal_distribution<double> normal;
@@ -86,12 +88,19 @@ TEST_F(Transforms, OfAStampThatWasSentKeepItsBitsWhateverComesLater) {
 
 TEST_F(Transforms, BetweenTwoStampsAreWhatTf2Says) {
   for (int i = 0; i < 50; ++i) {
-    add(sent("world", "hand", START + 10 * i * MS, turn(), place()));
+    Eigen::Quaterniond rounded = turn();
+    rounded.coeffs() *= 1 + 1e-15;
+    add(sent("world", "hand", START + 10 * i * MS, rounded, place()));
     add(sent("hand", "tool", START + 10 * i * MS + 5 * MS, turn(), place()));
   }
   for (StampNs stamp_ns = START + 5 * MS; stamp_ns < START + 480 * MS; stamp_ns += 7 * MS + 13) {
-    const auto found =
-        buffer.lookupTransform("world", "tool", ros::Time().fromNSec(static_cast<std::uint64_t>(stamp_ns)));
+    const ros::Time time = ros::Time().fromNSec(static_cast<std::uint64_t>(stamp_ns));
+    const auto link = buffer.lookupTransform("world", "hand", time).transform;
+    const Eigen::Quaterniond link_q(link.rotation.w, link.rotation.x, link.rotation.y, link.rotation.z);
+    const Eigen::Isometry3d hand = pose("world", "hand", stamp_ns);
+    EXPECT_EQ(hand.linear(), link_q.normalized().normalized().toRotationMatrix()) << "bit for bit";
+    EXPECT_EQ(hand.translation(), Vec3(link.translation.x, link.translation.y, link.translation.z));
+    const auto found = buffer.lookupTransform("world", "tool", time);
     const Eigen::Isometry3d ours = pose("world", "tool", stamp_ns), back = pose("tool", "world", stamp_ns);
     const auto& p = found.transform.translation;
     const auto& q = found.transform.rotation;

@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "support/brute_force.h"
 #include "step/history.h"
+#include "support/brute_force.h"
 #include "support/shapes.h"
 
 namespace dccd {

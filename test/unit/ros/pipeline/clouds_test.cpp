@@ -58,7 +58,7 @@ TEST_F(Clouds, WhatCannotBecomePartOfTheMapIsSaid) {
   geometry_msgs::TransformStamped far = cameraPose(1);
   far.child_frame_id = "far";
   far.transform.translation.x = 4000;  // of the 3276.8 m that 0.1 m can span
-  driven.transforms.setTransform(far, "test", true);
+  driven.tell({far}, true);
   const std::pair<sensor_msgs::PointCloud2, std::string> cases[] = {
       {flat, "the cloud was refused: there is no field 'z'; there are: x, y"},
       {integers, "the cloud was refused: field 'x' has datatype 5; FLOAT32 (7) or FLOAT64 (8) is needed"},

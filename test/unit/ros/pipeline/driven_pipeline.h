@@ -101,8 +101,7 @@ inline geometry_msgs::TransformStamped above(const std::string& child, double z,
 }
 
 struct Driven {
-  tf2::BufferCore transforms;
-  TransformFeed feed_tf{transforms};
+  TransformFeed feed_tf;
   MonitorConfig config;
   MonitorPipeline pipeline;
   Outcome outcome;
@@ -117,11 +116,11 @@ struct Driven {
   }
   void giveMap(double stamp_s) { giveMap(table(), stamp_s); }
   /// The frame `child`, at all times `z` above the world.
-  void raise(const std::string& child, double z) { transforms.setTransform(above(child, z), "test", true); }
-  void tell(const std::vector<geometry_msgs::TransformStamped>& moved) {
+  void raise(const std::string& child, double z) { tell({above(child, z)}, true); }
+  void tell(const std::vector<geometry_msgs::TransformStamped>& moved, bool is_static = false) {
     tf2_msgs::TFMessage message;
     message.transforms = moved;
-    feed_tf.add(message, false);
+    feed_tf.add(message, is_static);
   }
   void take(std::size_t body, const std::vector<std::uint8_t>& cloud, std::int64_t now_ns = 0) {
     pipeline.take(body, {"sensor_msgs/PointCloud2", cloud, 0, now_ns});

@@ -96,8 +96,7 @@ TEST(Inside, AMeshFileInMillimetresIsHintedAt) {
 }
 
 std::string errorOf(const XmlRpcValue& tree) {
-  tf2::BufferCore transforms;
-  TransformFeed feed(transforms);
+  TransformFeed feed;
   return said<ParameterError>([&] { MonitorPipeline pipeline(readConfig(tree), feed); });
 }
 

@@ -407,7 +407,7 @@ TEST(Sensors, WhatLiesBeyondTheOctreeIsRefusedWithItsCure) {
   geometry_msgs::TransformStamped far = cameraPose(1);
   far.child_frame_id = "far";
   far.transform.translation.x = 456000;  // UTM
-  camera.transforms.setTransform(far, "test", true);
+  camera.tell({far}, true);
   sensor_msgs::CameraInfo info = infoAt(1);
   info.header.frame_id = "far";
   camera.clouds.setCameraInfo(0, "", bytesOf(info));
@@ -504,10 +504,7 @@ TEST(Sensors, EachViewHasItsPlaceToWaitAndItsTurn) {
   for (const char* frame : {"camera", "other"}) {
     geometry_msgs::TransformStamped pose = cameraPose(1);
     pose.child_frame_id = frame;
-    driven.transforms.setTransform(pose, "test", true);
-    tf2_msgs::TFMessage message;
-    message.transforms.push_back(pose);
-    driven.feed_tf.add(message, true);
+    driven.tell({pose}, true);
   }
   Maps maps;
   std::atomic<MapLoader*> made{nullptr};
