@@ -1,11 +1,13 @@
-// What an intended path costs a step: the panda beside a cloth of 600 vertices over a map of 50,000 voxels, on a path
-// of 1 s in 20 pieces, far, along the cloth, down onto it, and in touch with it. On one thread, without a budget.
+// What an intended path costs a step, and what ~limits do: the panda beside a cloth of 600 vertices over a map of
+// 50,000 voxels, on a path of 1 s in 20 pieces, far, along the cloth, down onto it, and in touch with it. On one
+// thread, without a budget.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <ctime>
 #include <fstream>
 #include <iostream>
 
+#include "dccd/approach_limits.h"
 #include "dccd/intended.h"
 #include "support/timing.h"
 #include "unit/ros/robot/panda.h"
@@ -20,11 +22,24 @@ using test::Panda;
 constexpr int ROWS = 20, COLS = 30, VOXELS = 224, PIECES = 20;
 constexpr double SPACING_M = 0.02, VOXEL_M = 0.01;
 constexpr SpeedLaw LAW{0.137, 0.3125, 0.025};
+constexpr double LIMITS_MAX_M = 0.4, LIMITS_HORIZON_S = 0.3;
 
 double processorMs() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+/// Of each run but the first.
+template <class Run>
+nlohmann::json timesOf(int runs, const Run& run) {
+  std::vector<double> ms;
+  for (int i = 0; i <= runs; ++i) {
+    const double begin_ms = processorMs();
+    run();
+    if (i > 0) ms.push_back(processorMs() - begin_ms);
+  }
+  return spread(ms);
 }
 
 struct Scene {
@@ -123,17 +138,19 @@ nlohmann::json measure(const Panda& panda, const Scene& scene, int runs) {
   History history;
   const Outcome outcome = detect(step, options, history);
   PathSearch search;
-  std::vector<double> ms;
+  ApproachSearch approach;
   AlongPath along;
-  for (int run = 0; run <= runs; ++run) {
-    const double begin_ms = processorMs();
-    along = search.run(outcome, options, bounds, LAW, path);
-    if (run > 0) ms.push_back(processorMs() - begin_ms);
-  }
+  ApproachLimits limits;
+  const nlohmann::json ms = timesOf(runs, [&] { along = search.run(outcome, options, bounds, LAW, path); });
+  const nlohmann::json limits_ms =
+      timesOf(runs, [&] { limits = approach.run(outcome, options, bounds, LIMITS_MAX_M, LIMITS_HORIZON_S); });
   if (!along.unused.empty()) throw std::runtime_error("the path is not used: " + along.unused);
   return {{"scene", scene.name},
           {"bodies", step.bodies.size()},
-          {"ms", spread(ms)},
+          {"ms", ms},
+          {"limits_ms", limits_ms},
+          {"half_spaces", limits.of.size()},
+          {"unknown", limits.unknown},
           {"searches", along.searches},
           {"contact", static_cast<int>(along.contact)},
           {"until_s", along.until.seconds()},
@@ -157,8 +174,9 @@ int main(int argc, char** argv) {
   try {
     const dccd::test::Panda panda;
     nlohmann::json rows;
-    std::cout << "| the arm | bodies | ms a step | questions | until, s | by bounds | scale | by bounds |\n"
-                 "|---|--:|--:|--:|--:|--:|--:|--:|\n";
+    std::cout << "| the arm | bodies | ms a step | questions | until, s | by bounds | scale | by bounds | ~limits, ms "
+                 "| half-spaces |\n"
+                 "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
     for (const dccd::benchmarks::Scene& scene :
          {dccd::benchmarks::Scene{"is 3 m away", 3, 0.05, 0.4, 0},
           dccd::benchmarks::Scene{"goes along at 50 mm", 0, 0.05, 0.4, 0},
@@ -169,7 +187,8 @@ int main(int argc, char** argv) {
       rows.push_back(row);
       std::cout << "| " << scene.name << " | " << row["bodies"] << " | " << row["ms"]["median"].get<double>() << " | "
                 << row["searches"] << " | " << row["until_s"] << " | " << row["until_by_bounds_s"] << " | "
-                << row["scale"] << " | " << row["scale_by_bounds"] << " |\n";
+                << row["scale"] << " | " << row["scale_by_bounds"] << " | " << row["limits_ms"]["median"].get<double>()
+                << " | " << row["half_spaces"] << " |\n";
       std::cerr << row.dump() << '\n';
     }
     std::ofstream(out) << nlohmann::json{{"machine", dccd::benchmarks::machine()}, {"rows", rows}}.dump(1) << '\n';

@@ -132,8 +132,11 @@ class MonitorPipeline {
   std::string takeVoided() { return std::exchange(voided_, {}); }
   /// What a controller says that the robot is to do, from the next step on. Returns what is wrong with it, a clause;
   /// empty: it holds. Where nobody listens to it nothing happens.
-  std::string intend(const trajectory_msgs::JointTrajectory& message) { return intendAny(message); }
-  std::string intend(const geometry_msgs::TwistStamped& message) { return intendAny(message); }
+  template <class Message>
+  std::string intend(const Message& message) {
+    intends_anew_ = motion_.has_value();
+    return motion_ ? motion_->take(message, answered_ ? answered_->stamp_ns : 0) : std::string();
+  }
   /// The same of a message of whatever type, as it came or a bag has it: read now, and told when it is called. Throws
   /// what reading it throws.
   template <class Any>
@@ -141,7 +144,7 @@ class MonitorPipeline {
     const std::string type = message.getDataType();
     const auto tells = [this](const auto& motion) -> std::function<std::string()> {
       if (!motion) return [] { return std::string("has another definition of its type"); };
-      return [this, motion] { return intendAny(*motion); };
+      return [this, motion] { return intend(*motion); };
     };
     using Trajectory = trajectory_msgs::JointTrajectory;
     using Twist = geometry_msgs::TwistStamped;
@@ -277,11 +280,6 @@ class MonitorPipeline {
   std::vector<OtherMarkers> passed_over_;
   bool finishing_ = false;
 
-  template <class Message>
-  std::string intendAny(const Message& message) {
-    intends_anew_ = motion_.has_value();
-    return motion_ ? motion_->take(message, answered_ ? answered_->stamp_ns : 0) : std::string();
-  }
   void followIntended();
   AlongPath searchAlong(const IntendedPath& path, FirstTouch* first = nullptr);
   IntendedMotion::Lookup places();

@@ -86,11 +86,6 @@ deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch
   return out;
 }
 
-deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
-                                        const SpeedLaw& law, const std::string& frame) {
-  return toSpeedScale(outcome, speedScale(outcome, bounds, law), frame);
-}
-
 deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const SpeedScale& speed, const std::string& frame) {
   deformable_ccd::SpeedScale out;
   out.header = headerOf(outcome.stamp_ns, frame);

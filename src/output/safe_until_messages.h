@@ -20,8 +20,6 @@ deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch
                                       const std::vector<SpeedBound>& bounds, const ros::Time& now,
                                       const std::string& frame);
 /// What the distances allow; whether all else is proved is said by limitSpeed().
-deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
-                                        const SpeedLaw& law, const std::string& frame);
 deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const SpeedScale& speed, const std::string& frame);
 /// What a path says of a step.
 deformable_ccd::AlongPath toAlongPath(const Outcome& outcome, const IntendedPath& path, const AlongPath& along,

@@ -1,5 +1,6 @@
 #include "stream/path_distances.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -16,6 +17,26 @@ constexpr double LARGEST_M = 1e100;  // [m] guard: squares stay finite
 constexpr double ABOVE = 1 + 1e-12;  // [1] more than a few roundings take
 
 double largestOf(const Vec3& v) { return v.cwiseAbs().maxCoeff(); }
+
+/// A frame along which the points are spread: boxes are thin there around a sheet that lies across all axes.
+Eigen::Isometry3d ownFrameOf(const Positions& positions) {
+  Vec3 sum = Vec3::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  for (const Vec3& p : positions) {
+    sum += p;
+    squares += p * p.transpose();
+  }
+  const double count = static_cast<double>(positions.size());
+  const Eigen::Matrix3d spread = squares - sum * sum.transpose() / count;
+  Eigen::Isometry3d own_from_fixed = Eigen::Isometry3d::Identity();
+  if (!spread.allFinite()) return own_from_fixed;
+  Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  constexpr double ALONG = 1 - 1e-5;  // [1] of the thinnest direction: its own frame would spare nothing
+  if (axes.col(0).cwiseAbs().maxCoeff() > ALONG) return own_from_fixed;
+  axes.col(0) = axes.col(1).cross(axes.col(2));
+  own_from_fixed.linear() = Eigen::Quaterniond(axes).normalized().toRotationMatrix().transpose();
+  return own_from_fixed;
+}
 
 }  // namespace
 
@@ -53,8 +74,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
   one.is_known = true;
   const IntendedPath::Of* const of = path_->find(number);
   one.pose = of ? &of->pose : nullptr;
-  const Eigen::Isometry3d to_local =
-      of ? outcome_->step->bodies[of->frameOf()].pose_t1.inverse() : Eigen::Isometry3d::Identity();
+  one.own_from_fixed = of ? outcome_->step->bodies[of->frameOf()].pose_t1.inverse() : ownFrameOf(*body.t1);
   Eigen::AlignedBox3d box(Vec3::Zero());
   box.setEmpty();
   one.local.clear();
@@ -62,7 +82,7 @@ PathDistances::Shape& PathDistances::known(std::uint16_t number) {
   one.reach_m = one.out_m = 0;
   for (const Index v : one.setup.slot_vertex) {
     const bool is_asked = one.setup.asked.empty() || one.setup.asked[v];
-    const Vec3 p = is_asked ? Vec3(to_local * (*body.t1)[v]) : Vec3(Vec3::Zero());
+    const Vec3 p = is_asked ? Vec3(one.own_from_fixed * (*body.t1)[v]) : Vec3(Vec3::Zero());
     one.local.push_back(p);
     one.rest.push_back(atRestAt(p));
     if (is_asked) box.extend(p);
@@ -83,7 +103,8 @@ Eigen::Isometry3d PathDistances::poseAt(const Way& way, std::size_t piece, doubl
   };
   const Eigen::Isometry3d mover = at(shapes_[way.mover]);
   if (way.still == OBSTACLE_BODY) return outcome_->step->map.fromFixedAt(1) * mover;
-  return shapes_[way.still].pose ? at(shapes_[way.still]).inverse() * mover : mover;
+  const Shape& still = shapes_[way.still];
+  return (still.pose ? at(still).inverse() : still.own_from_fixed) * mover;
 }
 
 /// In a frame that turns evenly by w, and whose origin goes straight, a vertex that is x from that origin and has the
@@ -204,9 +225,10 @@ Vec3 PathDistances::nearest(Way& way, double time_s) {
   if (!std::isfinite(found_.upper_m)) return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   const Vec3 between = (found_.point[0] + found_.point[1]) / 2;
   if (way.still == OBSTACLE_BODY) return outcome_->step->map.fromFixedAt(1).inverse() * between;
-  const std::vector<Eigen::Isometry3d>* const pose = shapes_[way.still].pose;
+  const Shape& still = shapes_[way.still];
+  if (!still.pose) return still.own_from_fixed.inverse() * between;
   const std::size_t piece = path_->pieceAt(time_s);
-  return pose ? interpolate((*pose)[piece], (*pose)[piece + 1], path_->shareAt(piece, time_s)) * between : between;
+  return interpolate((*still.pose)[piece], (*still.pose)[piece + 1], path_->shareAt(piece, time_s)) * between;
 }
 
 }  // namespace dccd

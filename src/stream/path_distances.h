@@ -64,7 +64,8 @@ class DCCD_HIDDEN PathDistances {
     // Of the outcome and its path.
     bool is_known = false;
     const std::vector<Eigen::Isometry3d>* pose = nullptr;  // at the path's times; null: it stands still
-    Positions local;                                       // by slots, in its own frame; what stands still: fixed frame
+    Eigen::Isometry3d own_from_fixed;                      // at the path's begin
+    Positions local;                                       // by slots, in its own frame
     std::array<Vec3, 8> corners;                           // of the box around these
     double reach_m = 0, out_m = 0, radius_m = 0;
     std::vector<VertexMotion> motion, rest;  // by slots

@@ -82,7 +82,8 @@ class ReportPageTest(FolderTestCase):
         verdict = body[body.index('id="verdict"'):body.index('id="player"')]
         self.assertRegex(verdict, r'All 79 steps are proved.*The map was used.*First contact.*cloth with octomap: 0\.\d{3} s after')
         self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
-        self.assertNotIn('id="clearance_part"', body, 'what was not asked for takes no place')
+        for name in ('clearance_part', 'scales_part'):
+            self.assertNotIn('id="%s"' % name, body, 'what was not asked for takes no place')
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_what_made_it_and_what_touched(self):
@@ -236,7 +237,8 @@ class ReportPageTest(FolderTestCase):
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_how_close(self):
         """A curve a bound of each two partners."""
-        self.changed(lambda page: page['monitor'].update(effects={**page['monitor'].get('effects', {}), 'clearance': 'on'}, max_speed_m_s=2))
+        self.changed(lambda page: page['monitor'].update(effects={**page['monitor'].get('effects', {}), 'clearance': 'on'}, max_speed_m_s=2,
+                                                         speed_scale={'reaction_time_s': .1, 'stopping_time_s': .1}, intent={'horizon_s': 1, 'deviation_m': .01}))
         body, console = self.dom()
         self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
         drawn = body[body.index('id="clearance"'):].split('</svg>')[0]
@@ -244,6 +246,7 @@ class ReportPageTest(FolderTestCase):
         self.assertRegex(drawn, r'<polyline [^>]*stroke-dasharray="none"[^>]*><title>cloth with octomap')
         self.assertIn('distance [m]', drawn)
         self.assertRegex(body, r'id="clearance_note">[^<]*lower bound.*cloth with octomap')
+        self.assertEqual(body[body.index('id="scales"'):].split('</svg>')[0].count('<polyline '), 2, 'with and without ~intended')
         self.assertRegex(body, r'id="promises">safe until: \d+ promises of [\d.]+ s in the middle, \d+ kept, \d+ void, \d+ not looked at')
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')

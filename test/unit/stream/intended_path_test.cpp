@@ -86,6 +86,34 @@ TEST(IntendedPath, OnADiveTheTimeIsWhenTheTubesMayTouch) {
   EXPECT_EQ(along.contact, PathContact::FREE);
 }
 
+TEST(IntendedPath, ASheetAcrossAllAxesIsMetWhereItIs) {
+  Eigen::Isometry3d turned(Eigen::Translation3d(0.3, -0.2, 0.5));
+  turned.rotate(Eigen::AngleAxisd(0.7, Vec3(1, 0.6, 0.3).normalized()));
+  Scene dive(0.1);
+  TestStep below;
+  below.bodies = {sheet(9, 9, {-0.4, -0.4, 0}, 0.1)};
+  dive.step.map = {};
+  dive.step.bodies.push_back(below.motion().bodies[0]);
+  dive.step.bodies[1].name = "sheet";
+  dive.bounds.push_back({0});
+  for (Body& body : dive.step.bodies) {
+    Positions at = *body.t1;
+    for (Vec3& p : at) p = turned * p;
+    body.t0 = body.t1 = share(at);
+    body.self_collision = false;
+  }
+  dive.goes(turned.linear() * Vec3(0, 0, -0.5), 2).tube(0.001, 0);
+  History history;
+  FirstTouch first;
+  const Outcome outcome = detect(dive.step, dive.options, history);
+  PathSearch().run(outcome, dive.options, dive.bounds, LAW, dive.path, {}, &first);
+  EXPECT_LE(first.free_s, 0.099 / 0.25);
+  EXPECT_GE(first.free_s, 0.97 * 0.099 / 0.25);
+  const Vec3 there = turned.inverse() * first.point;
+  EXPECT_LE(there.head<2>().cwiseAbs().maxCoeff(), 0.05 + 1e-9);
+  EXPECT_NEAR(there.z(), 0.001, 0.001) << "between the two";
+}
+
 TEST(IntendedPath, NeverLessThanBoundsAloneAllow) {
   // A path faster than the bound, and a tube that is wider than the distance.
   for (const double deviation_m : {0.0, 0.3}) {

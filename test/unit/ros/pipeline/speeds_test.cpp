@@ -328,17 +328,19 @@ TEST(PromisesOfAPipeline, AreForgottenByAResetForItsReason) {
 }
 
 TEST(SpeedScaleMessage, IsZeroForAReason) {
-  const SpeedLaw law{0.1, 0.2, 0.02};
-  auto message = toSpeedScale(distant(3, ClearanceStatus::FARTHER), {{0.5}}, law, "world");
+  const auto scaleOf = [](const Outcome& outcome) {
+    return toSpeedScale(outcome, speedScale(outcome, {{0.5}}, {0.1, 0.2, 0.02}), "world");
+  };
+  auto message = scaleOf(distant(3, ClearanceStatus::FARTHER));
   EXPECT_EQ(message.scale, 1);
   EXPECT_EQ(message.holds_until, ros::Time(1.0));
   limitSpeed("not proved", message);
   EXPECT_EQ(message.scale, 0);
   EXPECT_EQ(message.reason, "not proved");
-  const auto near = toSpeedScale(distant(0.05, ClearanceStatus::MEASURED), {{0.5}}, law, "world");
+  const auto near = scaleOf(distant(0.05, ClearanceStatus::MEASURED));
   EXPECT_NEAR(near.needed, 0.5 * 0.2 + 0.02, 1e-12);
   EXPECT_EQ(near.bodies[1], "octomap");
-  const auto none = toSpeedScale(Outcome(), {{0.5}}, law, "world");
+  const auto none = scaleOf(Outcome());
   EXPECT_EQ(none.scale, 0);
   EXPECT_TRUE(std::isnan(none.needed));
   EXPECT_TRUE(none.holds_until.isZero());
