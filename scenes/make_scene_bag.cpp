@@ -4,7 +4,6 @@
 #include <iostream>
 #include <string>
 
-#include <tf2/buffer_core.h>
 #include <CLI/CLI.hpp>
 
 #include "apps/decimal_options.h"
@@ -22,8 +21,7 @@ void checkMonitorBlock(const dccd::scene::SceneSpec& spec, const std::string& sc
   if (!spec.monitor.isSet()) return;
   const dccd::MonitorConfig config = readConfig(spec.monitor, "monitor/", dccd::robotOfFiles());
   try {
-    tf2::BufferCore transforms;
-    dccd::TransformFeed feed(transforms);
+    dccd::TransformFeed feed;
     const dccd::MonitorPipeline pipeline(config, feed);  // effects that are not to be had, files
   } catch (const std::exception& error) {
     throw std::runtime_error(scene_path + ": monitor: " + error.what());

@@ -14,7 +14,6 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <ros/spinner.h>
-#include <tf2/buffer_core.h>
 #include <topic_tools/shape_shifter.h>
 
 #include "input/mesh_subscription.h"

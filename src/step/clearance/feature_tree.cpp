@@ -8,8 +8,7 @@ namespace dccd {
 void FeatureTree::build(const SceneBody& body, const Positions& positions) {
   const Topology& topology = *body.setup.topology;
   const auto asked = [&](Index v) { return body.asked.empty() || body.asked[v] != 0; };
-  features_.clear();
-  nodes_.clear();
+  *this = FeatureTree();
   std::vector<Edge> on_faces;
   std::vector<bool> covered(topology.vertexCount());
   for (const Face& f : topology.faces()) {
@@ -51,7 +50,6 @@ void FeatureTree::build(const SceneBody& body, const Positions& positions) {
   for (Feature& feature : slots_) {
     for (Index& v : feature) v = v == NO_INDEX ? NO_INDEX : slot_of[v];
   }
-  leaf_slots_.clear();
   for (Node& node : nodes_) {
     node.vertices = static_cast<std::uint32_t>(leaf_slots_.size());
     if (node.right != 0) continue;
