@@ -266,7 +266,8 @@ class CellTest(FolderTestCase):
                 message.others_until += genpy.Duration(1)
                 message.assumed.append("'finger' go along the intended path, at no more than its pace, within 0.01 m and 0 m/s")
         self.not_covered('a promise along an intended path', 'safe_until', longer)
-        self.not_covered('a scale that may be along an intended path', 'speed_scale', lambda m: m.scale > 0 and setattr(m, 'scale', 1))
+        self.not_covered('a scale that may be along an intended path', 'along_path', lambda m: setattr(m, 'used', True))
+        self.refuted('speed_scale', lambda m: m.scale > 0 and setattr(m, 'scale', 1), 'speed_scale', 'a scale of 1 needs')  # no path is used
 
     def test_limits(self):
         self.cell('limits', 'limits: {max_m: 0.4, horizon_s: 0.1}\n')
