@@ -75,9 +75,8 @@ Candidate ours(double uncertainty_m) {
   std::ostringstream numbers;
   numbers << "T_r " << law.reaction_time_s << " s, T_s " << law.stopping_time_s << " s, Z " << law.uncertainty_m
           << " m";
-  return {"speed_scale", numbers.str(), [=](const Outcome& o) {
-            return speedScale(o, {{ClosedLoop::CLOTH_SPEED_M_S, 3}}, law).scale;
-          }};
+  return {"speed_scale", numbers.str(),
+          [=](const Outcome& o) { return speedScale(o, {{ClosedLoop::CLOTH_SPEED_M_S}}, law).scale; }};
 }
 
 /// The runs of a law: with each seed a steady arm, then with each one that restarts.

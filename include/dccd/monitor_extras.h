@@ -21,9 +21,6 @@ struct SpeedBound {
   static constexpr double NONE = std::numeric_limits<double>::infinity();
   /// No vertex is ever faster, at full speed either [m/s], 0 or more; NONE: nobody says.
   double max_m_s = NONE;
-  /// Above 0: until the next frame no vertex is faster than this many times the body's fastest one in the step, either.
-  /// What a promise rests on is the less of the two. SpeedScale, which is what an arm may set off by, goes by max_m_s.
-  double last_step_factor = 0;
   bool slows_down = true;  ///< SpeedScale slows it; false: it goes on as fast, whatever the scale
   /// A rigid body of the step that carries this one, if that is another one than itself: no vertex leaves the place at
   /// which it would be carried faster than relative_m_s. Against what the same body carries this counts where it is

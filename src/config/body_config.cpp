@@ -39,13 +39,12 @@ namespace {
 
 void readDepthImage(ParameterReader& section, MeshInputConfig& input) {
   const bool is_image = input.source == TopologySource::DEPTH_IMAGE;
-  for (const char* name : {"max_edge_m", "stride", "min_range_m", "max_range_m", "median"}) {
+  for (const char* name : {"max_edge_m", "stride", "max_range_m", "median"}) {
     if (!is_image && section.has(name)) section.fail(name, "has no meaning without source: depth_image; remove it");
   }
   DepthSurfaceOptions& depth = input.depth;
   depth.max_edge_m = section.number("max_edge_m", depth.max_edge_m, 1e-6, LARGE);
   depth.stride = section.integer("stride", depth.stride, 1, 1000);
-  depth.min_range_m = section.number("min_range_m", depth.min_range_m, 0, LARGE);
   depth.max_range_m = section.number("max_range_m", depth.max_range_m, 0, LARGE);
   depth.median = section.integer("median", depth.median, 1, 15);
   if (depth.median % 2 == 0)
@@ -62,6 +61,7 @@ void readSets(ParameterReader section, BodyConfig& body) {
 
 void readTopology(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
+  refuseGone(section, "bodies/topology/");
   readSets(section.section("sets"), body);
   input.source = choiceOf(section, "source", TopologySource::AUTO,
                           {"auto", "message", "grid", "polyline", "file", "first_frame_weld", "depth_image"});
@@ -94,13 +94,10 @@ void readRigid(ParameterReader section, BodyConfig& body) {
 
 void readUncertainty(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
+  refuseGone(section, "bodies/uncertainty/");
   input.noise_radius_m = section.number("radius_m", 0.0, 0, MAX_NOISE_M);
   input.noise_field = section.get("field", std::string());
-  const bool scaled = section.has("scale");
-  input.noise_scale = section.number("scale", 1.0, 0, 1e6);
   section.finish();
-  if (scaled && input.noise_field.empty())
-    section.fail("scale", "has no meaning without field; write radius_m instead");
   if (!input.noise_field.empty() && body.isRigid()) {
     section.fail("field", "has no meaning for a rigid body, which sends no points; write radius_m instead");
   }

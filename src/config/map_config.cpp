@@ -11,13 +11,6 @@ namespace {
 // Each has a place to wait, and all that wait share an eighth of max_map_mb.
 constexpr std::size_t MOST_CLOUD_TOPICS = 16;
 
-void readSensorModel(ParameterReader section, CloudMapOptions& map) {
-  refuseGone(section, "sensor_model/");
-  map.hit = section.number("hit", map.hit, 0.5, 0.9999);
-  map.miss = section.number("miss", map.miss, 0.0001, 0.5);
-  section.finish();
-}
-
 CloudSource readCloudSource(ParameterReader entry) {
   CloudSource source;
   source.topic = entry.text("topic");
@@ -57,9 +50,8 @@ void readCloudTopics(ParameterReader& reader, MonitorConfig& config) {
 
 void readClouds(ParameterReader& reader, MonitorConfig& config) {
   // What is said of clouds is said by somebody who has them.
-  for (const char* name :
-       {"obstacle_cloud_topic", "obstacle_cloud_topics", "obstacle_resolution_m", "obstacle_min_range_m",
-        "obstacle_max_range_m", "obstacle_no_return", "obstacle_box", "sensor_model"}) {
+  for (const char* name : {"obstacle_cloud_topic", "obstacle_cloud_topics", "obstacle_resolution_m",
+                           "obstacle_min_range_m", "obstacle_max_range_m", "obstacle_no_return", "obstacle_box"}) {
     config.cloud_named = config.cloud_named || reader.has(name);
   }
   CloudSource& single = config.clouds.front();
@@ -90,7 +82,6 @@ void readClouds(ParameterReader& reader, MonitorConfig& config) {
       reader.fail("obstacle_box", "is empty; [x0, y0, z0, x1, y1, z1] in the map's frame, the smaller corner first");
     }
   }
-  readSensorModel(reader.section("sensor_model"), map);
 }
 
 }  // namespace

@@ -30,8 +30,8 @@ constexpr std::pair<const char*, const char*> GONE[] = {
     {"initial_contacts", "contacts are listed all; own_voxels_m takes a body's own voxels out of the map"},
     {"obstacle_camera_info_topic", "write obstacle_cloud_topics: [{topic: …, camera_info: …}]"},
     {"obstacle_sensor_frame", "write obstacle_cloud_topics: [{topic: …, sensor_frame: …}]"},
-    {"sensor_model/min", "no voxel is less probable than 0.12, as in octomap_server; remove it"},
-    {"sensor_model/max", "no voxel is more probable than 0.97, as in octomap_server; remove it"},
+    {"sensor_model", "its numbers are octomap_server's defaults (hit 0.7, miss 0.4, min 0.12, max 0.97); remove it"},
+    {"patch_gap_s", "a patch that comes back within 0.25 s is the same; remove it, or ask the library or Python"},
     {"markers/normal_length_m", "a normal is five points long; write markers/point_size_m"},
     {"markers/line_width_m", "a line is a fifth of a point wide; write markers/point_size_m"},
     {"markers/max_contacts", "the first 2000 are shown, as RViz can hold them; remove it"},
@@ -39,6 +39,10 @@ constexpr std::pair<const char*, const char*> GONE[] = {
     {"clearance/tolerance_m", "distances are known to 1e-4 m; remove it, or ask the library or Python"},
     {"record_folder", "steps are recorded to deformable_ccd in $ROS_HOME; set ROS_HOME of the node"},
     {"robot/scale", "scale single links by robot/links, or widen all of them by robot/padding_m"},
+    {"robot/timeout_s", "the start waits for the description for 10 s; remove it"},
+    {"robot/speed_factor", "a link's speed in the last step promises nothing of the next; write robot/max_speed_m_s"},
+    {"bodies/topology/min_range_m", "pixels within 0.01 m of the sensor are no measurement; remove it"},
+    {"bodies/uncertainty/scale", "the field is a radius in metres; let its publisher scale it, and remove it"},
     {"bodies/weld", "corners of triangles that coincide are one vertex; remove it"},
     {"bodies/max_vertices", "a mesh has at most 1000000 vertices; remove it"},
 };
@@ -96,7 +100,6 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   MonitorOptions& monitor = config.monitor;
   monitor.store.max_step_s = reader.number("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
   monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
-  monitor.patch_gap_s = reader.number("patch_gap_s", monitor.patch_gap_s, 0, LARGE);
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
   monitor.detector.max_contacts = reader.integer("max_contacts", monitor.detector.max_contacts, 1, MANY);
   for (const ParameterTree& item : reader.list("exclude_boxes")) {
@@ -175,10 +178,9 @@ std::vector<std::string> beyondLimits(const MonitorConfig& config) {
   }
   for (const BodyConfig& body : config.bodies) {
     if (body.input.source != TopologySource::DEPTH_IMAGE) continue;
-    const DepthSurfaceOptions &depth = body.input.depth, plain;
+    const DepthSurfaceOptions& depth = body.input.depth;
     const std::string what = "what the picture of body '" + body.body.name + "' shows ";
     if (depth.max_range_m > 0) add(what + "farther than ", depth.max_range_m, "topology/max_range_m");
-    if (depth.min_range_m > plain.min_range_m) add(what + "nearer than ", depth.min_range_m, "topology/min_range_m");
     std::ostringstream text;
     text << what << "in points that have no neighbours within topology/max_edge_m, " << depth.max_edge_m << " m";
     if (depth.stride > 1) text << ", and between each pixel and the next one by topology/stride, " << depth.stride;

@@ -48,12 +48,10 @@ RobotConfig readRobotParameters(ParameterReader section) {
   if (robot.description.empty())
     section.fail("description", "is needed: the parameter that holds the URDF, or its file");
   robot.semantic = section.get("semantic", std::string());
-  robot.timeout_s = section.number("timeout_s", robot.timeout_s, 0, LARGE);
   robot.padding_m = section.number("padding_m", robot.padding_m, 0, LARGE);
   robot.own_voxels_m = ownVoxelsOf(section, robot.own_voxels_m);
   robot.max_own_voxels = section.integer("max_own_voxels", robot.max_own_voxels, 0, MANY);
   if (section.has("max_speed_m_s")) robot.speed = speedBoundOf(section, {});
-  if (section.has("speed_factor")) robot.speed_factor = section.number("speed_factor", 1, 1e6);
   robot.visuals = section.get("visuals", robot.visuals);
   robot.against_links = section.get("against_links", robot.against_links);
   robot.against_map = section.get("against_map", robot.against_map);
@@ -114,7 +112,7 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
       body.body.not_against.push_back(static_cast<std::uint16_t>(first + other));
     }
     body.tf_frame = body.body.link = part.link;
-    body.speed = asked.speedOr(config.speed);
+    body.speed = asked.speed.value_or(config.speed);
     body.link_mesh = part.mesh;
     config.bodies.push_back(std::move(body));
   }
@@ -158,12 +156,6 @@ double RobotConfig::scaleOf(const std::string& link) const {
 double RobotConfig::paddingOf(const std::string& link) const {
   const auto own = links.find(link);
   return own == links.end() ? padding_m : own->second.padding_m.value_or(padding_m);
-}
-
-SpeedBound RobotConfig::speedOr(const SpeedBound& otherwise) const {
-  SpeedBound bound = speed.value_or(otherwise);
-  bound.last_step_factor = speed_factor;
-  return bound;
 }
 
 std::vector<std::string> namesOf(const Robot& robot) {

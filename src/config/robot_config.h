@@ -30,12 +30,10 @@ struct LinkSettings {
 struct RobotConfig {
   std::string description;          ///< a parameter's name or a file; empty: no robot
   std::string semantic;             ///< the same of the SRDF; empty: none
-  double timeout_s = 10;            ///< how long a live node waits for the two at its start
   double padding_m = 0;             ///< minimum separation of a link
   double scale = 1;                 ///< of the geometry about the link's origin
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link
   std::optional<SpeedBound> speed;  ///< of each link
-  double speed_factor = 0;          ///< SpeedBound::last_step_factor of each link
   std::size_t max_own_voxels = 0;   ///< of the links and of what they hold; with more nothing is proved; 0: no limit
   std::map<std::string, LinkSettings> links;
   bool against_links = false, against_map = false;
@@ -45,8 +43,6 @@ struct RobotConfig {
 
   double scaleOf(const std::string& link) const;
   double paddingOf(const std::string& link) const;
-  /// Of each link, where nothing is said of it alone `otherwise`.
-  SpeedBound speedOr(const SpeedBound& otherwise) const;
 };
 
 /// A collision element of a link.

@@ -33,12 +33,10 @@ LimitsConfig readApproachLimits(ParameterReader section) {
   return limits;
 }
 
-bool isBounded(const SpeedBound& speed) { return std::isfinite(speed.max_m_s) || speed.last_step_factor > 0; }
-
 /// Bodies that move by themselves, or with a link.
 bool anyBounded(const MonitorConfig& config) {
   return std::any_of(config.bodies.begin(), config.bodies.end(), [](const BodyConfig& body) {
-    return body.body.motion == BodyMotionKind::STREAM && isBounded(body.speed);
+    return body.body.motion == BodyMotionKind::STREAM && std::isfinite(body.speed.max_m_s);
   });
 }
 
@@ -74,11 +72,6 @@ void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config) {
                 "needs distances and a speed bound: give max_speed_m_s, with effects/clearance not off, or remove it");
   }
   if (!config.speed_law) return;
-  if (config.robot_asked.speed_factor > 0 && !std::isfinite(config.robot_asked.speedOr(config.speed).max_m_s)) {
-    reader.fail("robot/speed_factor",
-                "bounds the robot until the next frame alone, but speed_scale is a share of its full speed: give "
-                "robot/max_speed_m_s, too");
-  }
   if (!anyBounded(config)) {
     reader.fail("speed_scale", "needs a speed bound, without which it is always 0: give max_speed_m_s, or remove it");
   }
@@ -94,7 +87,7 @@ bool MonitorConfig::promises() const {
 std::vector<SpeedBound> MonitorConfig::speedBounds(std::size_t count) const {
   std::vector<SpeedBound> bounds;
   for (const BodyConfig& body : bodies) bounds.push_back(body.speed);
-  bounds.resize(std::max(count, bounds.size()), robot_asked.speedOr(speed));
+  bounds.resize(std::max(count, bounds.size()), robot_asked.speed.value_or(speed));
   return bounds;
 }
 

@@ -32,7 +32,7 @@ Cloud::Ptr thinned(const CloudView& cloud, const DepthSurfaceOptions& options, s
       const Vec3 p = cloud.point(row * cloud.width + col);
       // PCL works in float; what is past that is no point of a camera, either.
       if (!(p.cwiseAbs().maxCoeff() <= FAR_M) || (options.max_range_m > 0 && p.z() > options.max_range_m)) continue;
-      if (!(p.norm() > options.min_range_m)) {
+      if (!(p.norm() > NO_DEPTH_M)) {
         ++no_measurement;
         continue;
       }
@@ -97,8 +97,7 @@ DepthSurface depthSurface(const CloudView& cloud, const DepthSurfaceOptions& opt
   }
   if (surface.faces.empty()) {
     throw DepthSurfaceError("no three of the " + std::to_string(seen->size()) +
-                            " kept pixels are neighbours within topology/max_edge_m, topology/min_range_m and "
-                            "topology/max_range_m");
+                            " kept pixels are neighbours within topology/max_edge_m and topology/max_range_m");
   }
   return surface;
 }

@@ -117,11 +117,11 @@ void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std:
     if (!mesh.positions[i].allFinite()) continue;  // unchecked anyway, and trackers leave everything of it open
     const std::size_t point = pixel ? (*pixel)[i] : i;
     const double value = cloud->extraValue(point);
-    mesh.radius_m[i] += config_.noise_scale * value;
+    mesh.radius_m[i] += value;
     if (!(value >= 0) || !(mesh.radius_m[i] <= MAX_NOISE_M)) {
       std::ostringstream text;
       text << "field '" << config_.noise_field << "' of point " << point << " is " << value
-           << "; an uncertainty is not negative, and at most " << MAX_NOISE_M << " m with its scale and radius_m";
+           << "; an uncertainty is not negative, and at most " << MAX_NOISE_M << " m with radius_m";
       refuseMessage(text.str());
     }
   }

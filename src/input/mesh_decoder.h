@@ -37,10 +37,9 @@ struct MeshInputConfig {
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
   std::size_t max_faces = std::numeric_limits<std::size_t>::max();
-  /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is
-  /// named.
+  /// Uncertainty radius of each vertex [m]: noise_radius_m + the value of the point field, where one is named.
   std::string noise_field;
-  double noise_scale = 1, noise_radius_m = 0;
+  double noise_radius_m = 0;
   bool is_static = false;  ///< its newest frame holds at all times
 };
 

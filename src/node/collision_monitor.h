@@ -13,7 +13,7 @@ class CollisionMonitor {
  public:
   /// Reads the parameters under `private_node`, subscribes, advertises and starts its own threads: callbacks never wait
   /// for a step. Throws ParameterError or std::invalid_argument with one sentence that names the parameter.
-  /// Waits for a robot's description, while `goes_on` holds and up to robot/timeout_s.
+  /// Waits for a robot's description, while `goes_on` holds and up to ten seconds.
   /// Process::OWN ends within a second of the monitor's end, whatever still runs. In a SHARED one topics of a named
   /// type are subscribed to by that type, so that publishers in it hand over their objects.
   enum class Process { OWN, SHARED };

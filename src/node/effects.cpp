@@ -15,8 +15,7 @@ std::string noiseOf(const BodyConfig& body) {
   if (body.max_acceleration_m_s2 > 0 && body.hasNoise()) text << " + ";
   if (input.noise_radius_m > 0) text << input.noise_radius_m << " m";
   if (!input.noise_field.empty()) {
-    text << (input.noise_radius_m > 0 ? " + " : "") << input.noise_scale << " x point field '" << input.noise_field
-         << "'";
+    text << (input.noise_radius_m > 0 ? " + " : "") << "point field '" << input.noise_field << "'";
   }
   return text.str();
 }

@@ -15,6 +15,7 @@ namespace dccd {
 namespace {
 
 constexpr double LOOK_AGAIN_S = 0.1;
+constexpr std::chrono::seconds LONGEST_WAIT(10);
 
 bool isFile(const std::string& name) {
   const std::string ending = fileEnding(name);
@@ -38,13 +39,8 @@ RobotText readFile(const std::string& name, const std::string& what) {
 class ParameterTexts {
  public:
   using Waits = std::function<void(const std::string&)>;
-  ParameterTexts(const ros::NodeHandle& node, double timeout_s, const std::function<bool()>& goes_on,
-                 const Waits& waits)
-      : node_(node),
-        timeout_s_(timeout_s),
-        until_(Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * timeout_s))),
-        goes_on_(goes_on),
-        waits_(waits) {}
+  ParameterTexts(const ros::NodeHandle& node, const std::function<bool()>& goes_on, const Waits& waits)
+      : node_(node), until_(Clock::now() + LONGEST_WAIT), goes_on_(goes_on), waits_(waits) {}
 
   /// The parameter as robot_state_publisher and RViz find it: in the node's namespace, or in one around that.
   /// `held`: of a parameter, under its resolved name, what it holds.
@@ -58,8 +54,8 @@ class ParameterTexts {
       while (!node_.searchParam(name, found) && goes_on_() && Clock::now() < until_) {
         if (!std::exchange(told, true)) {
           std::ostringstream text;
-          text << "waits for parameter " << resolved << ", " << what << ", for " << timeout_s_
-               << " s at most (robot/timeout_s)";
+          text << "waits for parameter " << resolved << ", " << what << ", for " << LONGEST_WAIT.count()
+               << " s at most";
           ROS_INFO_STREAM(text.str());
           waits_(text.str());
         }
@@ -76,7 +72,7 @@ class ParameterTexts {
     }
     if (!read.text.empty()) return read;
     std::ostringstream waited;
-    waited << "was set by nobody for " << timeout_s_ << " s (robot/timeout_s); publish it before, or correct robot";
+    waited << "was set by nobody for " << LONGEST_WAIT.count() << " s; publish it before, or correct robot";
     read.problem = !found.empty() ? "is empty or no text; " + what + " is needed" : waited.str();
     return read;
   }
@@ -84,7 +80,6 @@ class ParameterTexts {
  private:
   using Clock = std::chrono::steady_clock;
   const ros::NodeHandle& node_;
-  double timeout_s_;
   Clock::time_point until_;
   const std::function<bool()>& goes_on_;
   const Waits& waits_;
@@ -95,7 +90,7 @@ class ParameterTexts {
 RobotLoader robotOfParameters(const ros::NodeHandle& node, std::function<bool()> goes_on,
                               std::function<void(const std::string&)> waits) {
   return [node, goes_on = std::move(goes_on), waits = std::move(waits)](const RobotConfig& config, double tolerance_m) {
-    const ParameterTexts texts(node, config.timeout_s, goes_on, waits);
+    const ParameterTexts texts(node, goes_on, waits);
     std::map<std::string, std::string> held;
     const RobotText description = texts.read(config.description, "a URDF", held);
     Robot robot = makeRobot(description, texts.read(config.semantic, "an SRDF", held), config, tolerance_m);

@@ -10,7 +10,7 @@
 namespace dccd {
 
 /// By a parameter's name, resolved by the node; an address (package://, file://) or a name that ends in .urdf, .srdf or
-/// .xml is a file. Waits for parameters up to robot/timeout_s together, while `goes_on` holds; `waits` is told for
+/// .xml is a file. Waits for parameters up to ten seconds together, while `goes_on` holds; `waits` is told for
 /// which.
 RobotLoader robotOfParameters(const ros::NodeHandle& node, std::function<bool()> goes_on,
                               std::function<void(const std::string&)> waits);

@@ -21,11 +21,7 @@ std::string assumedOf(const std::vector<Body>& bodies, const Body& body, const S
   if (bound.carrier < bodies.size())
     text << "no vertex of '" << body.name << "' leaves where '" << bodies[bound.carrier].name
          << "' carries it faster than " << bound.relative_m_s << " m/s, and ";
-  if (bound.last_step_factor > 0) {
-    text << "no vertex of '" << body.name << "' is faster than " << bound.last_step_factor
-         << " times its fastest in this step";
-    if (std::isfinite(bound.max_m_s)) text << ", nor than " << bound.max_m_s << " m/s";
-  } else if (bound.max_m_s == 0) {
+  if (bound.max_m_s == 0) {
     text << "'" << body.name << "' stands still";
   } else if (std::isfinite(bound.max_m_s)) {
     text << "no vertex of '" << body.name << "' is faster than " << bound.max_m_s << " m/s";

@@ -3,26 +3,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "step/parts.h"
-
 namespace dccd {
-namespace {
-
-/// The fastest of the body's vertices from any of its waypoints to the next [m/s].
-double fastestOf(const Body& body, double seconds) {
-  double fastest = 0;
-  forEachLeg(body, [&](const Positions& from, const Positions& to, double share) {
-    double way_sq = 0;
-    for (std::size_t v = 0; v < from.size(); ++v) {
-      const double one_sq = (to[v] - from[v]).squaredNorm();
-      if (std::isfinite(one_sq)) way_sq = std::max(way_sq, one_sq);
-    }
-    fastest = std::max(fastest, std::sqrt(way_sq) / (share * seconds));
-  });
-  return seconds > 0 ? fastest : SpeedBound::NONE;
-}
-
-}  // namespace
 
 std::string nameOf(const Outcome& outcome, std::size_t body) {
   return body == OBSTACLE_BODY ? "octomap" : "'" + outcome.step->bodies[body].name + "'";
@@ -44,22 +25,10 @@ std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<Speed
       throw std::invalid_argument(text.str());
     };
     require(bounds[b].max_m_s, "max_m_s");
-    require(bounds[b].last_step_factor, "last_step_factor");
     require(bounds[b].relative_m_s, "relative_m_s");
     if (bounds[b].carrier >= bounds.size()) bounds[b].carrier = SpeedBound::NO_CARRIER;  // it is not there
     const Body& body = outcome.step->bodies[b];
     if (body.motion == BodyMotionKind::STATIC && body.turns) bounds[b] = {};  // its frame takes it along
-  }
-  return bounds;
-}
-
-std::vector<SpeedBound> boundsAfter(const Outcome& outcome, const std::vector<SpeedBound>& given) {
-  std::vector<SpeedBound> bounds = boundsOf(outcome, given);
-  for (std::size_t b = 0; b < bounds.size(); ++b) {
-    SpeedBound& bound = bounds[b];
-    if (!(bound.last_step_factor > 0)) continue;
-    bound.max_m_s =
-        std::min(bound.max_m_s, bound.last_step_factor * fastestOf(outcome.step->bodies[b], outcome.duration_s()));
   }
   return bounds;
 }

@@ -35,8 +35,6 @@ inline bool isItself(const Clearance& pair) { return pair.body[0] == pair.body[1
 
 /// By body of the step. Throws std::invalid_argument naming the body whose bound is NaN or below 0.
 std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given);
-/// The same until the next frame: with what the last step says put in.
-std::vector<SpeedBound> boundsAfter(const Outcome& outcome, const std::vector<SpeedBound>& given);
 
 /// Why the outcome allows no promise whatever its distances are; empty: it does.
 std::string whyNone(const Outcome& outcome);

@@ -43,8 +43,7 @@ class Search {
   Search(const Outcome& outcome, const Options& options, const std::vector<SpeedBound>& bounds,
          const std::optional<SpeedLaw>& law, const IntendedPath& path, Deadline deadline, PathDistances& distances)
       : outcome_(outcome),
-        after_(boundsAfter(outcome, bounds)),
-        full_(boundsOf(outcome, bounds)),
+        bounds_(boundsOf(outcome, bounds)),
         law_(law),
         path_(beginningAt(path, *outcome.step)),
         deadline_(deadline),
@@ -88,13 +87,12 @@ class Search {
       pair.body = row.body;
       pair.number = number;
       pair.start_m = distanceOf(outcome_, insides, row);
-      const Speeds by_bounds = speedsOf(outcome_, row, after_), at_full = speedsOf(outcome_, row, full_);
-      if (by_bounds.unbounded.empty() && pair.start_m > 0) pair.apart_s = secondsTo(pair.start_m, by_bounds.closing());
+      const Speeds speeds = speedsOf(outcome_, row, bounds_);
+      const bool is_known = speeds.unbounded.empty() && pair.start_m > 0;
+      if (is_known) pair.apart_s = secondsTo(pair.start_m, speeds.closing());
       double allowed = 1;
-      if (law_ && !isItself(row) && at_full.slows) {
-        const bool is_known = at_full.unbounded.empty() && pair.start_m > 0;
-        allowed = is_known ? dccd::speedScale(pair.start_m, at_full.slowed, at_full.other, *law_) : 0;
-      }
+      if (law_ && !isItself(row) && speeds.slows)
+        allowed = is_known ? dccd::speedScale(pair.start_m, speeds.slowed, speeds.other, *law_) : 0;
       bool slows = true, swings_on = false;  // what is on the path; what it carries, when all stands
       for (const std::uint16_t body : row.body) {
         if (body == OBSTACLE_BODY) {
@@ -104,11 +102,11 @@ class Search {
         if (const IntendedPath::Of* const of = path_.find(body)) {
           ++pair.on_path;
           pair.rate_m_s += of->relative_m_s;
-          slows = slows && full_[of->frameOf()].slows_down;
-          swings_on = swings_on || !full_[body].slows_down;
+          slows = slows && bounds_[of->frameOf()].slows_down;
+          swings_on = swings_on || !bounds_[body].slows_down;
         } else {
-          (full_[body].slows_down ? pair.slowed_m_s : pair.other_m_s) = full_[body].max_m_s;
-          pair.closing_m_s = after_[body].max_m_s;
+          pair.closing_m_s = bounds_[body].max_m_s;
+          (bounds_[body].slows_down ? pair.slowed_m_s : pair.other_m_s) = pair.closing_m_s;
         }
       }
       if (isItself(row) || pair.on_path == 0) {
@@ -323,7 +321,7 @@ class Search {
   }
 
   const Outcome& outcome_;
-  const std::vector<SpeedBound> after_, full_;
+  const std::vector<SpeedBound> bounds_;
   const std::optional<SpeedLaw> law_;
   const IntendedPath path_;  // from where the bodies are
   const Deadline deadline_;

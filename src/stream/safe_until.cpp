@@ -83,7 +83,7 @@ bool hasNewVoxels(const VoxelSurface& now, const VoxelSurface& before) {
 SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given) {
   SafeUntil result;
   result.stamp_ns = result.until_ns = result.others_until_ns = outcome.stamp_ns;
-  const std::vector<SpeedBound> bounds = boundsAfter(outcome, given);
+  const std::vector<SpeedBound> bounds = boundsOf(outcome, given);
   result.reason = whyNone(outcome);
   if (!result.reason.empty()) return result;
   const Insides insides(outcome);
@@ -175,7 +175,7 @@ void PromiseWatch::keep(const Outcome& outcome) {
   ++counts_.made;
   step_ = outcome.step;
   obstacle_ = outcome.obstacle;
-  assumed_ = boundsAfter(outcome, bounds_);
+  assumed_ = boundsOf(outcome, bounds_);
 }
 
 void PromiseWatch::extend(const Outcome& outcome, const SafeUntil& later,
@@ -232,7 +232,6 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
   require(law.stopping_time_s, "stopping_time_s");
   require(law.uncertainty_m, "uncertainty_m");
   SpeedScale result;
-  // Scale 1 is full speed, whatever was done of late: a factor of the last motion says nothing of what an arm may do.
   const std::vector<SpeedBound> bounds = boundsOf(outcome, given);
   result.reason = whyNone(outcome);
   if (!result.reason.empty()) return result;

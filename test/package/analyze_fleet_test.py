@@ -112,7 +112,7 @@ class FleetTest(FolderTestCase):
             self.assertTrue(changed)
             self.assertEqual({p.relative_to(self.out).parts[1] for p in changed}, {'second'})
             between = stamps()
-            self.params.write_text(text + '\npatch_gap_s: 0.0\n')
+            self.params.write_text(text + '\nqueue_size: 9\n')
             self.assertEqual(fleet(*same, self.params).returncode, 4)
             self.assertTrue(all(between.get(p) != stamp for p, stamp in stamps().items()))
         finally:

@@ -206,7 +206,7 @@ class Chase {
     return options;
   }
   std::vector<SpeedBound> bounds() const {
-    return {{SpeedBound::NONE}, {cloth_speed_, 0, false}, {SpeedBound::NONE, 0, false, 0, leaves_m_s_}};
+    return {{SpeedBound::NONE}, {cloth_speed_, false}, {SpeedBound::NONE, false, 0, leaves_m_s_}};
   }
   Outcome outcome() const {
     History history;

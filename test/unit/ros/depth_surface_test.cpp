@@ -80,9 +80,6 @@ TEST(DepthSurface, PixelsAtTheOriginAreNoMeasurement) {
   EXPECT_EQ(surface.no_measurement, 16u);
   EXPECT_EQ(surface.positions.size(), 144u - 16);
   for (const Vec3& p : surface.positions) EXPECT_EQ(p.z(), 1.0);
-  DepthSurfaceOptions from_two_metres = options(0.15);
-  from_two_metres.min_range_m = 2;
-  EXPECT_THROW(depthSurface(image.view(), from_two_metres), DepthSurfaceError);
   std::fill(image.bytes.begin(), image.bytes.end(), 0);
   EXPECT_THROW(depthSurface(image.view(), options(0.15)), DepthSurfaceError) << "it sees nothing";
 }

@@ -77,7 +77,7 @@ TEST(Parameters, ADepthImageIsHeldAgainstOtherBodiesOnly) {
 
 TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   XmlRpcValue tree = parameters(
-      "bodies: {felt: {topic: felt, minimum_separation_m: 0.01}, other: {uncertainty: {field: sigma, scale: 3.0}}}, "
+      "bodies: {felt: {topic: felt, minimum_separation_m: 0.01}, other: {uncertainty: {field: sigma}}}, "
       "minimum_separation_pairs: [{between: [octomap, felt], separation_m: 0.0}, "
       "{between: [felt, other], separation_m: 0.02}]");
   const MonitorConfig config = readConfig(tree);
@@ -87,7 +87,6 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   EXPECT_EQ(config.bodies[0].body.separations[0].body, OBSTACLE_BODY);
   EXPECT_EQ(config.bodies[0].body.separations[1].body, 1u);
   EXPECT_EQ(config.bodies[1].input.noise_field, "sigma");
-  EXPECT_EQ(config.bodies[1].input.noise_scale, 3.0);
   tree["effects"]["minimum_separation"] = "off";
   tree["effects"]["tracker_noise"] = "off";
   tree["accuracy"] = "exact";
@@ -110,11 +109,9 @@ TEST(Parameters, WhatLimitsLeaveOutOfCloudsAndPicturesIsSaid) {
                                       "what clouds show outside of obstacle_box"}));
   EXPECT_TRUE(excludedBy("obstacle_cloud_topic: /points, obstacle_max_range_m: 0.0").empty());
   const std::string picture = "bodies: {cloth: {topic: cloth}, seen: {motion: static, topology: {source: depth_image, ";
-  EXPECT_EQ(excludedBy(picture + "max_range_m: 4.0, min_range_m: 0.5}}}"),
+  EXPECT_EQ(excludedBy(picture + "max_range_m: 4.0}}}"),
             (std::vector<std::string>{
                 "what the picture of body 'seen' shows farther than 4 m by topology/max_range_m",
-                "what the picture of body 'seen' shows nearer than 0.5 m by "
-                "topology/min_range_m",
                 "what the picture of body 'seen' shows in points that have no neighbours within topology/max_edge_m, "
                 "0.05 m, and between each pixel and the next one by topology/stride, 4",
             }));

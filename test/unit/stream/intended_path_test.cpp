@@ -240,7 +240,7 @@ TEST(IntendedPath, WhatComesByItselfHasNoStandingRule) {
   Scene scene(0.1);
   scene.step.bodies.push_back(boxBody("person", {-0.5, -0.5, 0.25}, {0.5, 0.5, 0.5}));
   scene.step.bodies[1].against_obstacle = false;
-  scene.bounds = {{0.5}, {1, 0, false}};
+  scene.bounds = {{0.5}, {1, false}};
   scene.goes({0.2, 0, 0}, 1);
   EXPECT_EQ(scene.run().scale.scale, 0) << "it may come 0.1 m until the arm begins to slow down";
   scene.bounds[1] = {1};

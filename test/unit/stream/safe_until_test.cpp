@@ -212,17 +212,6 @@ TEST(SafeUntil, AContactBeginsAtTheSeparation) {
   EXPECT_FALSE(safeUntil(outcome, {{1}, {0}}).isPromise());
 }
 
-TEST(SafeUntil, ALinkIsAssumedToBeSoManyTimesAsFastAsInTheStep) {
-  const Outcome outcome = changed(answered({between(0, 1, apart(0.6))}), [](Step& step) {
-    Positions before = *step.bodies[1].t1;
-    before[1].x() -= 0.02;  // in 0.1 s
-    step.bodies[1].t0 = share(before);
-  });
-  EXPECT_NEAR(safeUntil(outcome, {{0}, {NONE, 3}}).seconds(), 1, 1e-6);
-  EXPECT_NEAR(safeUntil(outcome, {{0}, {0.5, 3}}).seconds(), 1.2, 1e-6) << "nor faster than it can be";
-  EXPECT_NEAR(safeUntil(outcome, {{0}, {0.7, 3}}).seconds(), 1, 1e-6);
-}
-
 /// The tip, which dips by so much after so many tenths of the step and comes back.
 Outcome dipped(const Outcome& outcome, double by_m, int tenths) {
   return changed(outcome, [&](Step& step) {
@@ -240,15 +229,6 @@ Outcome turnedAside(const Outcome& outcome, double by_m, int tenths) {
     step.bodies[1].rigid = step.bodies[1].turns = true;
     step.bodies[1].waypoints = {aside};
   });
-}
-
-TEST(SafeUntil, ALinkIsAsFastAsFromWaypointToWaypoint) {
-  const Outcome at_rest = answered({between(0, 1, apart(0.6))});  // 0.1 s
-  EXPECT_EQ(safeUntil(at_rest, {{0}, {NONE, 3}}).closing_m_s, 0);
-  for (const Outcome& outcome : {dipped(at_rest, 0.02, 5), turnedAside(at_rest, 0.02, 5)})
-    EXPECT_NEAR(safeUntil(outcome, {{0}, {NONE, 3}}).seconds(), 0.6 / (3 * 0.4), 1e-6);
-  for (const Outcome& outcome : {dipped(at_rest, 0.02, 8), turnedAside(at_rest, 0.02, 8)})
-    EXPECT_NEAR(safeUntil(outcome, {{0}, {NONE, 3}}).seconds(), 0.6 / (3 * 1.0), 1e-6) << "it came back in 0.02 s";
 }
 
 // A hand in a box, away from its faces: how far the surfaces are is no distance of the two.
@@ -304,7 +284,7 @@ TEST(SafeUntil, WhatMayBeInsideForWantOfTimeIsNoPromise) {
 TEST(SafeUntil, RefusesSpeedsThatAreNone) {
   const Outcome outcome = answered({between(0, 1, apart(0.6))});
   for (const double bad : {-1.0, -NONE, std::nan("")}) {
-    for (const SpeedBound& bound : {SpeedBound{bad}, SpeedBound{1, bad}}) {
+    for (const SpeedBound& bound : {SpeedBound{bad}, SpeedBound{1, true, 0, bad}}) {
       const std::string text = said<std::invalid_argument>([&] { safeUntil(outcome, {{1}, bound}); });
       EXPECT_TRUE(mentions(text, "of body 'tip'")) << bad << text;
     }
@@ -526,7 +506,7 @@ TEST(SpeedScale, OfWhatIsNoNumberIsZero) {
 }
 
 TEST(SpeedScale, IsTheLeastOfAllPairsAndSaysWhich) {
-  const std::vector<SpeedBound> bounds{{0.5}, {0.5, 0, false}};
+  const std::vector<SpeedBound> bounds{{0.5}, {0.5, false}};
   const SpeedScale free = speedScale(answered({between(0, 1, apart(3))}), bounds, LAW);
   EXPECT_EQ(free.scale, 1);
   EXPECT_EQ(free.reason, "");
@@ -553,15 +533,15 @@ TEST(SpeedScale, IsAShareOfFullSpeedHoweverSlowTheLastStepWas) {
       for (Vec3& p : before) p.z() += way_m;
       step.bodies[1].t0 = share(before);
     });
-    const SpeedScale scale = speedScale(hand, {{0}, {0.5, 3}}, law);
+    const SpeedScale scale = speedScale(hand, {{0}, {0.5}}, law);
     EXPECT_EQ(scale.scale, speedScale(0.025, 0.5, 0, law)) << way_m;
     EXPECT_LT(scale.scale, 0.05) << way_m;
     EXPECT_EQ(scale.needed_m, separationDistance(1, 0.5, 0, law));
     Outcome person = hand;
     person.clearances = {between(0, 1, apart(0.005))};
-    EXPECT_EQ(speedScale(person, {{1.6, 0, false}, {0.5, 3}}, law).scale, 0) << way_m << ": a person is 5 mm away";
-    EXPECT_EQ(speedScale(hand, {{0}, {NONE, 3}}, law).scale, 0);
-    EXPECT_EQ(speedScale(hand, {{0}, {NONE, 3}}, law).reason, "no speed bound is known of body 'tip'");
+    EXPECT_EQ(speedScale(person, {{1.6, false}, {0.5}}, law).scale, 0) << way_m << ": a person is 5 mm away";
+    EXPECT_EQ(speedScale(hand, {{0}, {NONE}}, law).scale, 0);
+    EXPECT_EQ(speedScale(hand, {{0}, {NONE}}, law).reason, "no speed bound is known of body 'tip'");
   }
 }
 

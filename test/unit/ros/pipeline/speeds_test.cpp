@@ -228,16 +228,6 @@ TEST(SafeUntilMessage, HasNoNumberWhereNothingIsKnown) {
   EXPECT_TRUE(none.bodies[0].empty() && none.assumed.empty());
 }
 
-TEST(SafeUntilMessage, SaysWhatAFactorOfTheLastMotionRestsOn) {
-  const Outcome outcome = distant(0.3, ClearanceStatus::MEASURED);
-  const auto assumed = [&](const SpeedBound& bound) {
-    return toSafeUntil(outcome, PromiseWatch(), {bound}, ros::Time(1.1), "world").assumed[0];
-  };
-  EXPECT_EQ(assumed({NONE, 3}), "no vertex of 'cloth' is faster than 3 times its fastest in this step");
-  EXPECT_EQ(assumed({0.5, 3}),
-            "no vertex of 'cloth' is faster than 3 times its fastest in this step, nor than 0.5 m/s");
-}
-
 TEST(SpeedScaleMessage, ItsAgeIsThatOfTheStampOrOfTheArrival) {
   const SpeedLaw law{0.3, 0.2, 0.02};
   EXPECT_EQ(whyTooOld(0.2, 0.1, law), "");

@@ -12,13 +12,13 @@ namespace test {
 namespace {
 
 TEST(TrackerNoise, ComesFromThePointField) {
-  Driven noisy(scene("uncertainty: {field: sigma, scale: 3}"));
+  Driven noisy(scene("uncertainty: {field: sigma}"));
   noisy.giveMap(1);
   EXPECT_TRUE(noisy.pipeline.effects().plan().running(Effect::TRACKER_NOISE));
   noisy.feed(1, 0.17f, {0, 0, 0, 0});
   EXPECT_TRUE(assuranceOf(noisy.feed(1.1, 0.15f, {0, 0, 0, 0})).clear()) << "15 cm above the map";
-  // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
-  const Outcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
+  // One vertex known to 0.12 m: down to 0.1 m above the map it may touch; the features at it too, no others.
+  const Outcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.12f, 0});
   ASSERT_FALSE(outcome.contacts.empty());
   for (const Contact& c : outcome.contacts) {
     EXPECT_TRUE(std::count(c.vertex.begin(), c.vertex.end(), 2u)) << "feature without the uncertain vertex";

@@ -173,7 +173,7 @@ TEST_F(Attached, OtherBodiesLoseNoStepAndNoPatchByIt) {
 }
 
 TEST_F(Attached, ItMovesWithItsLinkAndStaysWhereItIsLetGo) {
-  start(robotScene("", "effects: {octomap: 'off'}, patch_gap_s: 0.0"));  // each touch is news
+  start(robotScene("", "effects: {octomap: 'off', patches: 'off'}"));  // each touch is news
   feed(1, 0, 0.8f);
   ASSERT_TRUE((feed(1.1, 0, 0.8f), said().clear())) << said().missing.front();
   attach(plate());

@@ -57,20 +57,6 @@ TEST(RobotParameters, LinksHaveASpeedBoundOfTheirOwn) {
   EXPECT_EQ(one.bodies[1].speed.max_m_s, 0.3);
   EXPECT_EQ(one.speedBounds(6)[5].max_m_s, 0.3) << "of what is attached, too";
   EXPECT_EQ(read("max_speed_m_s: 0.5\nrobot: d\n").bodies[1].speed.max_m_s, 0.5);
-  const MonitorConfig factor = read("robot: {description: d, speed_factor: 3}\n");
-  EXPECT_EQ(factor.bodies[1].speed.last_step_factor, 3);
-  EXPECT_EQ(factor.bodies[0].speed.last_step_factor, 0);
-  EXPECT_TRUE(factor.promises());
-  EXPECT_TRUE(mentions(errorOf("robot: {description: d, speed_factor: 0.5}\n"), "robot/speed_factor"));
-  const MonitorConfig both = read("robot: {description: d, speed_factor: 2, max_speed_m_s: 1}\n");
-  EXPECT_EQ(both.bodies[1].speed.last_step_factor, 2);
-  EXPECT_EQ(both.bodies[1].speed.max_m_s, 1);
-  EXPECT_EQ(both.speedBounds(6)[5].last_step_factor, 2);
-  const std::string scale = "speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}\n";
-  EXPECT_TRUE(mentions(errorOf("robot: {description: d, speed_factor: 2}\n" + scale), "robot/max_speed_m_s, too"));
-  EXPECT_TRUE(read("robot: {description: d, speed_factor: 2, max_speed_m_s: 1}\n" + scale).speed_law);
-  const MonitorConfig all = read("max_speed_m_s: 0.4\nrobot: {description: d, speed_factor: 2}\n" + scale);
-  EXPECT_EQ(all.bodies[1].speed.max_m_s, 0.4) << "of all bodies, and so of the robot";
 }
 
 TEST(RobotParameters, LinksMeetEachOtherAndTheMapWhereThatIsAskedFor) {
