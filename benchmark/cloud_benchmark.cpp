@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/cloud_map.h"
+#include "base/next_surface.h"
 #include "dccd/tolerances.h"
 #include "support/seen_scene.h"
 #include "support/timing.h"
@@ -181,7 +182,8 @@ void serve(octomap::OcTree& tree, const Case& c, const Message& message) {
 }
 
 /// The message's bytes to the surface after them.
-std::shared_ptr<const VoxelSurface> see(CloudMap& map, const Case& c, const Message& message) {
+std::shared_ptr<const VoxelSurface> see(CloudMap& map, const Case& c, const Message& message,
+                                        const std::shared_ptr<const VoxelSurface>& before) {
   const std::vector<float> values = valuesOf(message, c.form);
   const SensorView view = c.form == Form::DEPTHS ? test::viewOf(message.pose, values, c.lens, message.width)
                                                  : test::viewOf(message.pose, values, message.width);
@@ -191,7 +193,8 @@ std::shared_ptr<const VoxelSurface> see(CloudMap& map, const Case& c, const Mess
   OctomapLimits limits;
   limits.free_leaves = false;
   DecodedOctomap leaves = map.leaves(limits);
-  return VoxelSurface::build(leaves.resolution_m, std::move(leaves.occupied));
+  return before ? nextSurface(leaves.resolution_m, std::move(leaves.occupied), *before)
+                : VoxelSurface::build(leaves.resolution_m, std::move(leaves.occupied));
 }
 
 /// Means over the second half of the messages, when the map knows the scene; of each run.
@@ -206,7 +209,7 @@ nlohmann::json measure(const Case& c, int repeat, int repeat_server) {
       double ms = 0;
       for (std::size_t i = 0; i < c.messages.size(); ++i) {
         const double start = threadMs();
-        surface = see(map, c, c.messages[i]);
+        surface = see(map, c, c.messages[i], surface);
         if (i >= first) ms += threadMs() - start;
       }
       voxels = surface->leafCount();

@@ -1,10 +1,11 @@
-// What comes before a step against a map: the map's surface, and whose voxels are whose.
+// What comes before a step against a map: the map's surface, whole or from the one before, and whose voxels are whose.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
 #include <set>
 
+#include "base/next_surface.h"
 #include "dccd/stream.h"
 #include "obstacle/voxel_bits.h"
 #include "support/octomap_cases.h"
@@ -54,24 +55,48 @@ std::vector<OccupiedLeaf> leavesOf(const Keys& keys) {
   return leaves;
 }
 
+/// One voxel in a hundred is another one: a part of a wall is further back, or one here and one there is higher.
+Keys changed(Keys keys, bool in_one_place) {
+  const std::size_t half = keys.size() / 200;
+  std::mt19937 random(9);
+  std::vector<std::array<int, 3>> all(keys.begin(), keys.end());
+  if (!in_one_place) std::shuffle(all.begin(), all.end(), random);
+  for (std::size_t i = 0; i < half; ++i) keys.erase(all[i]);
+  for (std::size_t i = 0, added = 0; added < half; ++i) {
+    std::array<int, 3> key = all[in_one_place ? i % half : all.size() / 2 + i % (all.size() / 2)];
+    const int away = 1 + static_cast<int>(i / half);
+    in_one_place ? key[0] -= away : key[2] += away;
+    added += keys.insert(key).second;
+  }
+  return keys;
+}
+
 }  // namespace
 
 std::vector<nlohmann::json> measureBuilds(int repeat) {
-  const std::vector<OccupiedLeaf> leaves = leavesOf(room());
-  std::vector<double> times;
-  for (int r = -2; r < repeat; ++r) {  // the first ones get their memory from the system
-    std::vector<OccupiedLeaf> given = leaves;
-    const Stopwatch watch;
-    const auto surface = VoxelSurface::build(VOXEL_M, std::move(given));
-    if (r >= 0) times.push_back(watch.milliseconds());
-    if (surface->leafCount() != leaves.size()) throw std::runtime_error("the surface lost leaves");
-  }
-  return {{{"case", "surface of a map, built on its own thread"},
-           {"triangles", 0},
-           {"voxels", leaves.size()},
-           {"contacts", 0},
-           {"required_ms", 20.0},
-           {"ms", spread(times)}}};
+  const Keys keys = room();
+  const std::vector<OccupiedLeaf> leaves = leavesOf(keys);
+  const auto before = VoxelSurface::build(VOXEL_M, leaves);
+  const auto time = [&](const std::string& name, const std::vector<OccupiedLeaf>& list, double required_ms,
+                        bool whole) {
+    std::vector<double> times;
+    for (int r = -2; r < repeat; ++r) {  // the first ones get their memory from the system
+      std::vector<OccupiedLeaf> given = list;
+      const Stopwatch watch;
+      const auto surface =
+          whole ? VoxelSurface::build(VOXEL_M, std::move(given)) : nextSurface(VOXEL_M, std::move(given), *before);
+      if (r >= 0) times.push_back(watch.milliseconds());
+      if (surface->leafCount() != list.size()) throw std::runtime_error("the surface lost leaves");
+    }
+    return nlohmann::json{
+        {"case", name},       {"triangles", 0}, {"voxels", list.size()}, {"contacts", 0}, {"required_ms", required_ms},
+        {"ms", spread(times)}};
+  };
+  std::vector<nlohmann::json> runs{time("surface of a map, built on its own thread", leaves, 20.0, true)};
+  const double quarter_ms = runs[0]["ms"]["median"].get<double>() / 4;
+  runs.push_back(time("the next map, 1 % of it other in one place", leavesOf(changed(keys, true)), quarter_ms, false));
+  runs.push_back(time("the next map, 1 % of it other all over", leavesOf(changed(keys, false)), quarter_ms, false));
+  return runs;
 }
 
 std::vector<nlohmann::json> measureOwnVoxels(int repeat) {

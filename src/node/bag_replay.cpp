@@ -35,7 +35,7 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
                   MapOdds* odds = nullptr) {
   LoadedMap map;
   map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
-  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory, odds);
+  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory, nullptr, odds);
   map.receipt_ns = receiptOf(message);
   if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
   return map;

@@ -324,7 +324,8 @@ void CloudMapping::refuse(std::size_t source, StampNs receipt_ns, const std::str
   view.receipt_ns = receipt_ns;
 }
 
-LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<bool()>& may_wait) {
+LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<bool()>& may_wait,
+                            const VoxelSurface* before) {
   const std::int64_t start_ns = steadyNs();
   LoadedMap map;
   map.frame_id = frame_;
@@ -332,7 +333,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
   Reading reading{map, {message.source, {}}, may_wait};
   bool is_seen = false;
   forgetRefused(message.receipt_ns);
-  loadMap(config_, &memory_, map, [&](const OctomapLimits& limits) {
+  loadMap(config_, &memory_, before, map, [&](const OctomapLimits& limits) {
     SensorView seen = read(message, reading);
     const auto known = views_.find(reading.view);
     seen.clears = !(message.is_behind && known != views_.end() && known->second.fills_next);

@@ -57,8 +57,9 @@ class CloudMapping {
   /// a map has the next number where the cloud is in what the next map will show. There is no map while the newest
   /// cloud of any view was refused, or of a source none has come. `may_wait` is asked again and again while there is
   /// no transform at the cloud's stamp (without one: at its receipt), or no CameraInfo; it says whether to go on, and
-  /// takes its time. hasFrame() must hold.
-  LoadedMap add(const CloudMessage& message, const std::function<bool()>& may_wait);
+  /// takes its time. hasFrame() must hold. `before`: as decodeMapMessage()'s.
+  LoadedMap add(const CloudMessage& message, const std::function<bool()>& may_wait,
+                const VoxelSurface* before = nullptr);
   /// A message that was refused undecoded counts as the newest one of its source.
   void refuse(std::size_t source, StampNs receipt_ns, const std::string& problem);
   /// One of the source came, and becomes no part of the map. From any thread.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <new>
 
+#include "base/next_surface.h"
 #include "base/octomap_decode.h"
 #include "dccd/known_space.h"
 #include "dccd/tolerances.h"
@@ -33,8 +34,8 @@ OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std
 }
 
 /// Each list ends before the next is made: what they take together is what MapMemory reckons with.
-void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, std::size_t max_unknown,
-           LoadedMap& map) {
+void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before,
+           std::size_t max_unknown, LoadedMap& map) {
   const auto counted = [memory](auto made) { return memory ? memory->counted(std::move(made)) : made; };
   // A map that has nothing free does not tell what it has seen: for own voxels, what is not occupied is free there. An
   // empty one has seen nothing: whoever made it began anew.
@@ -52,7 +53,9 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
     const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, max_unknown);
     decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
   }
-  map.surface = counted(VoxelSurface::build(decoded.resolution_m, std::move(decoded.occupied)));
+  std::vector<OccupiedLeaf>& occupied = decoded.occupied;
+  map.surface = counted(before ? nextSurface(decoded.resolution_m, std::move(occupied), *before)
+                               : VoxelSurface::build(decoded.resolution_m, std::move(occupied)));
 }
 
 }  // namespace
@@ -67,12 +70,12 @@ std::string frameNameOf(const HeaderView& header) {
   return frame;
 }
 
-void loadMap(const MonitorConfig& config, const MapMemory* memory, LoadedMap& map,
+void loadMap(const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before, LoadedMap& map,
              const std::function<DecodedOctomap(const OctomapLimits&)>& decode) {
   try {
     std::size_t max_unknown = tolerance::MAX_UNKNOWN_LEAVES;
     DecodedOctomap decoded = decode(limitsOf(config, memory, max_unknown));
-    build(std::move(decoded), config, memory, std::min(max_unknown, tolerance::MAX_UNKNOWN_LEAVES), map);
+    build(std::move(decoded), config, memory, before, std::min(max_unknown, tolerance::MAX_UNKNOWN_LEAVES), map);
   } catch (const std::bad_alloc&) {
     map.problem = "there is not enough memory for this map";
   } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
@@ -99,9 +102,9 @@ std::string whyRefused(const std::string& problem, const MonitorConfig& config) 
 }
 
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config, const MapMemory* memory,
-                           MapOdds* odds) {
+                           const VoxelSurface* before, MapOdds* odds) {
   LoadedMap map;
-  loadMap(config, memory, map, [&](const OctomapLimits& limits) {
+  loadMap(config, memory, before, map, [&](const OctomapLimits& limits) {
     WireReader wire(bytes.data(), bytes.size());
     const HeaderView header = readHeader(wire);
     map.stamp_ns = header.stamp_ns;
@@ -124,7 +127,7 @@ LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, cons
   LoadedMap map;
   map.frame_id = config.octomap_frame;
   map.trusted = true;
-  loadMap(config, memory, map, [&](const OctomapLimits& limits) { return readOctomapFile(file, limits); });
+  loadMap(config, memory, nullptr, map, [&](const OctomapLimits& limits) { return readOctomapFile(file, limits); });
   return map;
 }
 

@@ -14,8 +14,9 @@ namespace dccd {
 std::string frameNameOf(const HeaderView& header);
 
 /// The surface of what `decode` makes of the limits. Never throws: what that throws becomes LoadedMap::problem.
-/// `memory`: what it must fit in; null: no limit but that of the message.
-void loadMap(const MonitorConfig& config, const MapMemory* memory, LoadedMap& map,
+/// `memory`: what it must fit in; null: no limit but that of the message. `before`: the surface of an older map, from
+/// which it is made faster; null: none.
+void loadMap(const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before, LoadedMap& map,
              const std::function<DecodedOctomap(const OctomapLimits&)>& decode);
 
 }  // namespace dccd

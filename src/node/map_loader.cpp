@@ -123,9 +123,10 @@ bool MapLoader::mayWait(const Job& job) {
 LoadedMap MapLoader::load(const Job& job) {
   if (!job.file.empty()) return loadMapFile(job.file, config_, &memory_);
   if (job.problem.empty() && config_.takesClouds()) {
-    return clouds_.add(job.message, [&] { return mayWait(job); });
+    return clouds_.add(
+        job.message, [&] { return mayWait(job); }, last_.get());
   }
-  if (job.problem.empty()) return decodeMapMessage(job.message.bytes, config_, &memory_, &odds_);
+  if (job.problem.empty()) return decodeMapMessage(job.message.bytes, config_, &memory_, last_.get(), &odds_);
   if (config_.takesClouds()) clouds_.refuse(job.message.source, job.message.receipt_ns, job.problem);
   LoadedMap refused;
   refused.problem = job.problem;
@@ -178,6 +179,7 @@ void MapLoader::loop() {
     if (map.stamp_ns == 0) map.stamp_ns = map.receipt_ns;
     if (!config_.takesClouds()) map.number = job.number;
     if (!map.surface) ++refused_;
+    if (map.surface || !config_.takesClouds()) last_ = map.surface;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       keep(std::move(map));

@@ -27,10 +27,11 @@ std::string mapMessageProblem(const std::string& datatype, const std::string& md
 /// Why there is no map, of one whose problem this is.
 std::string whyRefused(const std::string& problem, const MonitorConfig& config);
 /// A serialised octomap_msgs/Octomap to a map; never throws: what is wrong is in LoadedMap::problem.
-/// `memory`: what it must fit in; null: no limit but that of the message. `odds`: of the maps before, or null: nobody
-/// is told what they found.
+/// `memory`: what it must fit in; null: no limit but that of the message. `before`: of an older map, or null; the same
+/// map is then made faster. `odds`: of the maps before, or null: nobody is told what they found.
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config,
-                           const MapMemory* memory = nullptr, MapOdds* odds = nullptr);
+                           const MapMemory* memory = nullptr, const VoxelSurface* before = nullptr,
+                           MapOdds* odds = nullptr);
 /// A .bt or .ot file. Never throws.
 LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, const MapMemory* memory = nullptr);
 
@@ -84,7 +85,8 @@ class MapLoader {
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
   const MapMemory memory_{config_};
   CloudMapping clouds_;
-  MapOdds odds_;  // the thread's
+  std::shared_ptr<const VoxelSurface> last_;  // of the newest map, if that was not refused; the thread's
+  MapOdds odds_;                              // the same
   std::function<void()> ready_;
   std::mutex mutex_;
   std::condition_variable changed_;

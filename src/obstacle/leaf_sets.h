@@ -117,13 +117,15 @@ void visitDifference(const VoxelTree& tree, const VoxelTree& other, Visit&& visi
 }
 
 /// What of the tree's leaves no leaf of `without` covers, and the leaves of `more`, which have nothing in common with
-/// that.
+/// that; in the order in which nextSurface() takes leaves fast.
 inline std::vector<OccupiedLeaf> leavesWithout(const VoxelTree& tree, const VoxelTree& without,
                                                const std::vector<OccupiedLeaf>& more) {
-  std::vector<OccupiedLeaf> left;
+  std::vector<OccupiedLeaf> left, parts = more;
   left.reserve(tree.leaves().size() + more.size());
   const auto cut = [&](const OccupiedLeaf& leaf) {
-    visitUncovered(without, leaf, [&](const OccupiedLeaf& part) { left.push_back(part); });
+    visitUncovered(without, leaf, [&](const OccupiedLeaf& part) {
+      (part.size == leaf.size || leaf.size == 2 ? left : parts).push_back(part);
+    });
   };
   const auto& nodes = tree.nodes(0);
   for (std::uint32_t p = 0; p < tree.nodes(1).size(); ++p) {
@@ -143,8 +145,16 @@ inline std::vector<OccupiedLeaf> leavesWithout(const VoxelTree& tree, const Voxe
     }
   }
   std::for_each(tree.leaves().begin() + tree.firstLeafOfLevel(1), tree.leaves().end(), cut);
-  left.insert(left.end(), more.begin(), more.end());
-  return left;
+  const auto isBefore = [](const OccupiedLeaf& a, const OccupiedLeaf& b) {
+    const int level = VoxelTree::levelOfSize(a.size), other = VoxelTree::levelOfSize(b.size);
+    if (level != other) return level < other;
+    return codeOf(a) < codeOf(b);
+  };
+  if (parts.empty()) return left;
+  std::sort(parts.begin(), parts.end(), isBefore);
+  std::vector<OccupiedLeaf> all(left.size() + parts.size());
+  std::merge(left.begin(), left.end(), parts.begin(), parts.end(), all.begin(), isBefore);
+  return all;
 }
 
 }  // namespace dccd

@@ -1,9 +1,11 @@
 #include "obstacle/voxel_exposure.h"
 
+#include <algorithm>
+
 namespace dccd {
+namespace exposure {
 namespace {
 
-using Cell = std::array<std::int32_t, 3>;
 using Coverage = VoxelTree::Coverage;
 
 std::array<FeatureMask, 64> makeFeatureTable() {
@@ -68,10 +70,18 @@ void blockFeatures(const VoxelTree::Node& node, const std::array<std::uint64_t, 
   }
 }
 
-/// Leaves of one and two voxels, a level 1 node (16 voxels a side) at a time. Tells the tree of their cells, too.
-void setSmallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>& masks) {
+}  // namespace
+
+FeatureMask featuresOf(FeatureMask faces) { return FEATURES_OF_FACES[faces]; }
+
+void setSmallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>& masks,
+                    const std::vector<std::uint8_t>* wanted) {
   const VoxelTree::Node& parent = tree.nodes(1)[index];
   if (parent.child == 0) return;
+  if (wanted != nullptr) {
+    const auto first = wanted->begin() + parent.first_child, last = first + bitCount(parent.child);
+    if (std::find(first, last, 1) == last) return;
+  }
   const std::array<std::uint16_t, 3>& at = tree.nodeCell(1, index);
   std::array<std::uint32_t, FACE_DIRECTIONS> next;
   std::array<bool, FACE_DIRECTIONS> next_full{};
@@ -87,6 +97,7 @@ void setSmallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMas
   std::uint32_t child = parent.first_child;
   for (std::uint64_t children = parent.child; children != 0; children &= children - 1, ++child) {
     const unsigned bit = lowestBit(children);
+    if (wanted != nullptr && !(*wanted)[child]) continue;
     const VoxelTree::Node& node = tree.nodes(0)[child];
     const std::array<std::uint8_t, 3>& cell = CELL_COORDINATES[bit];
     std::array<std::uint64_t, FACE_DIRECTIONS> exposed;
@@ -103,6 +114,8 @@ void setSmallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMas
     tree.setFeatureCells(0, child, (x & y) | (y & z) | (z & x), x & y & z);
   }
 }
+
+namespace {
 
 /// Is some voxel of the one-voxel layer of the cube at `cell` that touches the leaf (on the cube's side away from
 /// `direction`) empty?
@@ -141,7 +154,9 @@ bool edgeHasGap(const VoxelTree& tree, Cell b_cell, Cell c_cell, std::int32_t si
   return edgeHasGap(tree, b_cell, c_cell, half, db, dc);
 }
 
-/// Of a leaf of four voxels and more, whose neighbours may be of any size: recursion only where they are mixed.
+}  // namespace
+
+/// Recursion only where the neighbours are mixed.
 FeatureMask largeLeaf(const VoxelTree& tree, const OccupiedLeaf& leaf) {
   const std::int32_t size = static_cast<std::int32_t>(leaf.size);
   const Cell own{leaf.min.x, leaf.min.y, leaf.min.z};
@@ -193,15 +208,16 @@ void markFeatureCells(VoxelTree& tree, const std::vector<FeatureMask>& masks) {
   tree.raiseFeatureCells();
 }
 
-}  // namespace
+}  // namespace exposure
 
 std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
   std::vector<FeatureMask> masks(tree.leaves().size(), 0);
-  for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node) setSmallLeaves(tree, node, masks);
+  for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node)
+    exposure::setSmallLeaves(tree, node, masks, nullptr);
   for (std::size_t leaf = tree.firstLeafOfLevel(1); leaf < masks.size(); ++leaf) {
-    masks[leaf] = largeLeaf(tree, tree.leaves()[leaf]);
+    masks[leaf] = exposure::largeLeaf(tree, tree.leaves()[leaf]);
   }
-  markFeatureCells(tree, masks);
+  exposure::markFeatureCells(tree, masks);
   return masks;
 }
 

@@ -26,4 +26,27 @@ constexpr int cornerBit(int side_x, int side_y, int side_z) { return 18 + side_x
 /// Also tells the tree which cells hold edges and corners.
 std::vector<FeatureMask> exposedFeatures(VoxelTree& tree);
 
+/// next_exposure.cpp: the same of a tree that followed another one, whose masks these are: only what the change reaches
+/// is looked at.
+std::vector<FeatureMask> exposedFeatures(VoxelTree& tree, const VoxelTree& before,
+                                         const std::vector<FeatureMask>& masks_before, const VoxelTree::Change& change);
+
+/// What both are made of.
+namespace exposure {
+
+using Cell = std::array<std::int32_t, 3>;
+
+/// Of a leaf with these exposed faces.
+FeatureMask featuresOf(FeatureMask faces);
+/// Leaves of one and two voxels, a level 1 node (16 voxels a side) at a time; of its blocks those that are `wanted`
+/// (null: all). Tells the tree of their cells, too.
+void setSmallLeaves(VoxelTree& tree, std::uint32_t node, std::vector<FeatureMask>& masks,
+                    const std::vector<std::uint8_t>* wanted);
+/// Leaves of four voxels and more, whose neighbours may be of any size.
+FeatureMask largeLeaf(const VoxelTree& tree, const OccupiedLeaf& leaf);
+/// Tells the tree of all cells, once it knows those of small leaves.
+void markFeatureCells(VoxelTree& tree, const std::vector<FeatureMask>& masks);
+
+}  // namespace exposure
+
 }  // namespace dccd

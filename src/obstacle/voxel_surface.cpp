@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "base/next_surface.h"
 #include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
@@ -35,6 +36,19 @@ std::shared_ptr<const VoxelSurface> VoxelSurface::build(double resolution_m, std
   std::vector<FeatureMask> features = exposedFeatures(tree);
   return std::make_shared<const VoxelSurface>(
       std::make_unique<Impl>(resolution_m, std::move(tree), std::move(features)));
+}
+
+std::shared_ptr<const VoxelSurface> nextSurface(double resolution_m, std::vector<OccupiedLeaf> leaves,
+                                                const VoxelSurface& before) {
+  // Where voxels have another size little is in common, whatever the keys say.
+  if (resolution_m != before.resolution()) return VoxelSurface::build(resolution_m, std::move(leaves));
+  VoxelTree::Change change;
+  auto tree = VoxelTree::following(leaves, VoxelSurface::Impl::of(before).tree, change);
+  if (!tree) return VoxelSurface::build(resolution_m, std::move(leaves));
+  std::vector<FeatureMask> features =
+      exposedFeatures(*tree, VoxelSurface::Impl::of(before).tree, VoxelSurface::Impl::of(before).features, change);
+  return std::make_shared<const VoxelSurface>(
+      std::make_unique<VoxelSurface::Impl>(resolution_m, std::move(*tree), std::move(features)));
 }
 
 VoxelSurface::VoxelSurface(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -103,16 +103,28 @@ bool VoxelTree::takeSorted(const std::vector<OccupiedLeaf>& leaves) {
     end = code + std::uint64_t{leaf.size} * leaf.size * leaf.size;
     ++counts[levelOfSize(leaf.size)];
   }
+  setLevels(counts);
+  levels_[0].nodes.reserve(blocks);
+  levels_[0].cells.reserve(blocks);
+  takeByLevel(leaves);
+  return true;
+}
+
+void VoxelTree::setLevels(const std::array<std::uint32_t, LEVELS>& counts) {
   for (int level = 0; level < LEVELS; ++level) {
     if (counts[level] != 0) levels_with_leaves_ |= 1u << level;
     first_leaf_of_level_[level + 1] = first_leaf_of_level_[level] + counts[level];
   }
-  levels_[0].nodes.reserve(blocks);
-  levels_[0].cells.reserve(blocks);
+}
+
+void VoxelTree::takeByLevel(const std::vector<OccupiedLeaf>& leaves) {
+  if (levels_with_leaves_ == 1) {
+    leaves_ = leaves;
+    return;
+  }
   std::array<std::uint32_t, LEVELS + 1> next = first_leaf_of_level_;
   leaves_.resize(leaves.size());
   for (const OccupiedLeaf& leaf : leaves) leaves_[next[levelOfSize(leaf.size)]++] = leaf;
-  return true;
 }
 
 std::size_t VoxelTree::countNodes(int level, const std::vector<std::uint64_t>& prefixes) const {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dccd/voxel_surface.h"
@@ -54,11 +55,30 @@ class VoxelTree {
   /// 65536, a key is no multiple of its size, or two leaves overlap.
   explicit VoxelTree(const std::vector<OccupiedLeaf>& leaves);
 
+  /// How a tree differs from one before it. What it has in common with that keeps its edges and corners.
+  struct Change {
+    struct Block {
+      std::array<std::uint16_t, 3> cell;  ///< of a node of level 0, in units of the node
+      std::uint64_t voxels;               ///< those that are occupied by its small leaves in one of the two trees alone
+      std::uint32_t node;                 ///< in this tree; or NONE
+      std::uint32_t before;               ///< in the tree before: it, or where it is new the node that comes next
+      bool is_new;
+    };
+    std::vector<Block> blocks;                ///< with other small leaves
+    std::vector<std::uint32_t> large_before;  ///< of each leaf of the levels above, the same leaf; or NONE
+    std::vector<OccupiedLeaf> large;          ///< larger leaves that only one of the two has
+  };
+  /// The same tree, made of the one before it, where the leaves come in Morton order as a decoded map's do: then they
+  /// are taken. Where they do not, or cannot make a tree: nothing.
+  static std::optional<VoxelTree> following(std::vector<OccupiedLeaf>& leaves, const VoxelTree& before, Change& change);
+
   /// In the tree's order: by level, then by Morton code.
   const std::vector<OccupiedLeaf>& leaves() const { return leaves_; }
   const std::vector<Node>& nodes(int level) const { return levels_[level].nodes; }
   /// Where convex edges and corners of the node's own leaves lie, for queries that want nothing else.
   void setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners);
+  /// The same of one cell.
+  void setFeatureCell(std::uint32_t node, unsigned bit, bool edge, bool corner);
   /// Once they are set for all nodes: tells the nodes above.
   void raiseFeatureCells();
   /// Keys of what is occupied, the upper ones exclusive. False: nothing is.
@@ -102,6 +122,7 @@ class VoxelTree {
   bool reachesLeaf(const KeyBox& box) const;
 
  private:
+  VoxelTree() = default;
   struct Level {
     std::vector<Node> nodes;
     std::vector<std::array<std::uint16_t, 3>> cells;
@@ -109,8 +130,19 @@ class VoxelTree {
     int table_shift = 0;
   };
 
+  // voxel_tree_following.cpp
+  bool takeLevels(std::vector<OccupiedLeaf>& leaves, bool small);
+  std::uint32_t commonBlocks(const VoxelTree& before, std::uint32_t node, std::uint32_t& leaf) const;
+  bool followBlocks(const VoxelTree& before, Change& change, std::vector<std::uint64_t>& prefixes);
+  void placeBlocks(const VoxelTree& before, const std::vector<Node>& changed, const Change& change);
+  bool followLarge(const VoxelTree& before, Change& change) const;
+
   /// False, and nothing is taken, where leaves do not come in Morton order, as a decoded map's do.
   bool takeSorted(const std::vector<OccupiedLeaf>& leaves);
+  /// counts: of the leaves of each level.
+  void setLevels(const std::array<std::uint32_t, LEVELS>& counts);
+  /// Sorts them by level, in their order; once the levels are set.
+  void takeByLevel(const std::vector<OccupiedLeaf>& leaves);
   std::size_t countNodes(int level, const std::vector<std::uint64_t>& prefixes) const;
   void buildLevel(int level, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);
@@ -143,6 +175,13 @@ class VoxelTree {
   std::uint32_t levels_with_leaves_ = 0;  ///< bit l: some leaf belongs to level l
   std::vector<OccupiedLeaf> leaves_;
 };
+
+inline void VoxelTree::setFeatureCell(std::uint32_t node, unsigned bit, bool edge, bool corner) {
+  Node& n = levels_[0].nodes[node];
+  const std::uint64_t others = ~(std::uint64_t{1} << bit);
+  n.edges = (n.edges & others) | std::uint64_t{edge} << bit;
+  n.corners = (n.corners & others) | std::uint64_t{corner} << bit;
+}
 
 inline std::uint32_t VoxelTree::find(int level, std::int32_t x, std::int32_t y, std::int32_t z) const {
   const Level& l = levels_[level];

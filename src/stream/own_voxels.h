@@ -111,13 +111,14 @@ class OwnVoxelFinder {
   std::vector<OccupiedLeaf> remembered_;       // obstacles that the last map did not show, nor showed as free
   std::map<std::uint16_t, StampNs> first_;     // of each body, its first frame that is known of
   std::map<std::uint16_t, std::shared_ptr<const MeshFrame>> last_frames_;  // of each, not after the last map
-  std::set<std::uint16_t> known_;   // bodies whose way up to the last map was known
-  RigidShapes shapes_;              // of bodies that have been asked about
-  std::vector<OccupiedLeaf> seen_;  // of the last map: in doubt for its maker
-  SeenAlone seen_alone_;            // of the last map
-  std::uint64_t number_ = 0;        // ObstacleMap::number of the last map
-  std::string why_lost_;            // why one was lost since it, as far as somebody said so
-  std::string gap_;                 // before the map that put some voxel in doubt; empty: none
+  std::set<std::uint16_t> known_;              // bodies whose way up to the last map was known
+  RigidShapes shapes_;                         // of bodies that have been asked about
+  std::vector<OccupiedLeaf> seen_;             // of the last map: in doubt for its maker
+  SeenAlone seen_alone_;                       // of the last map
+  std::weak_ptr<const VoxelSurface> reduced_;  // of the map before, if it is still there
+  std::uint64_t number_ = 0;                   // ObstacleMap::number of the last map
+  std::string why_lost_;                       // why one was lost since it, as far as somebody said so
+  std::string gap_;                            // before the map that put some voxel in doubt; empty: none
 };
 
 }  // namespace dccd

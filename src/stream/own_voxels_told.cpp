@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/next_surface.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "stream/own_voxels.h"
@@ -84,9 +85,13 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   map.own.voxels = share(std::move(voxels));
   describe(bodies, trust_first, map.known != nullptr, gap_, map.own);
   if (!without.empty()) {
-    map.surface = VoxelSurface::build(
-        resolution_m, leavesWithout(VoxelSurface::Impl::of(*map.surface).tree, VoxelTree(without), sure.leaves()));
+    const auto last = reduced_.lock();
+    const std::shared_ptr<const VoxelSurface> given = map.surface;
+    map.surface =
+        nextSurface(resolution_m, leavesWithout(VoxelSurface::Impl::of(*given).tree, VoxelTree(without), sure.leaves()),
+                    last ? *last : *given);
   }
+  reduced_ = map.surface;
   return map;
 }
 
