@@ -212,7 +212,8 @@ class Search {
   double farthest(Goal goal, PathPair& pair, double to_s) {
     const bool scales = goal == Goal::SCALE, may_stand = scales && pair.may_stand;
     double holds_s = scales ? std::max(pair.allowed_s, pair.leaves_s) : pair.apart_s;
-    const double last_s = lastOf(goal, pair, to_s), enough_m = needs(goal, pair, last_s);
+    // Where nothing is needed, some is asked for all the same: what may touch is no less than 0 apart.
+    const double last_s = lastOf(goal, pair, to_s), enough_m = std::max(needs(goal, pair, last_s), tolerance_m_);
     const bool may_more = pair.start_m > 0 && (!scales || pair.may_scale) && std::isfinite(enough_m);
     if (holds_s >= to_s || !may_more) return std::min(holds_s, to_s);
     const double tolerance_m = std::max(tolerance_m_ / 2, enough_m / 100);
