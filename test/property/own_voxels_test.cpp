@@ -461,7 +461,7 @@ TEST(OwnVoxelsProperty, WhatIsOwnIsWhatTheRuleNames) {
       for (std::size_t b = 0; b < bodies.size(); ++b) {
         tracked.push_back({static_cast<std::uint16_t>(b), "cloth", bodies[b].reach_m, &bodies[b].store});
       }
-      const ObstacleMap reduced = finder.reduce(map, beside.get(), tracked, lag_s);
+      const ObstacleMap reduced = finder.reduce(map, beside.get(), tracked, lag_s, false);
       for (const OwnVoxel& voxel : *reduced.own.voxels) {
         look.said[{voxel.key.x - 32768, voxel.key.y - 32768, voxel.key.z - 32768}] = voxel.doubted;
       }

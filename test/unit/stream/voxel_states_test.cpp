@@ -76,7 +76,8 @@ class OneVoxel {
     map.map_from_fixed = map_from_fixed_;
     map.stamp_ns = now_;
     map.frame_id = "map";
-    reduced_ = finder_.reduce(map, nullptr, {{0, "first", 0.05, &stores_[0]}, {1, "second", 0.05, &stores_[1]}}, 0);
+    reduced_ =
+        finder_.reduce(map, nullptr, {{0, "first", 0.05, &stores_[0]}, {1, "second", 0.05, &stores_[1]}}, 0, false);
   }
   /// The next map is one of a frame that is elsewhere.
   void moveMap() { map_from_fixed_.translation().x() += VOXEL_M; }
