@@ -30,7 +30,8 @@ WORDS = {'source', '.', 'cd', 'echo', 'roslaunch', 'rosrun', 'rostopic', 'rosser
          'qemu-x86_64-static', 'analyze_bag', 'check_step', 'make_scene_bag', 'replay_step'}
 # Words that are programs too, but stand on the pages as what they mean in English or in a file.
 PROSE = {'file', 'link', 'test', 'map', 'time', 'at', 'find', 'look', 'of', 'more', 'if', 'for', 'while', 'case', 'then', 'true', 'false',
-         'size', 'head', 'as', 'cut', 'sort', 'split', 'join', 'type', 'who', 'which', 'last', 'read', 'set', 'c++', 'watch', 'bc', 'import'}
+         'size', 'head', 'as', 'cut', 'sort', 'split', 'join', 'type', 'who', 'which', 'last', 'read', 'set', 'c++', 'watch', 'bc',
+         'import', 'see'}
 # Words that a command begins with -> why it is not run here.
 NOT_RUN = {
     'scripts/demo': 'is the first command in the bare root (scripts/lib/newcomer.sh)',
