@@ -145,11 +145,11 @@ Case lidarCase(int frames) {
   return c;
 }
 
-void setModel(octomap::OcTree& tree, const CloudMapOptions& options) {
-  tree.setProbHit(options.hit);
-  tree.setProbMiss(options.miss);
-  tree.setClampingThresMin(options.min);
-  tree.setClampingThresMax(options.max);
+void setModel(octomap::OcTree& tree) {
+  tree.setProbHit(tolerance::MAP_HIT);
+  tree.setProbMiss(tolerance::MAP_MISS);
+  tree.setClampingThresMin(tolerance::MAP_LEAST);
+  tree.setClampingThresMax(tolerance::MAP_MOST);
 }
 
 /// OctomapServer::insertScan() for the points that are no ground, with its defaults.
@@ -217,7 +217,7 @@ nlohmann::json measure(const Case& c, int repeat, int repeat_server) {
     }
     if (run < repeat_server) {
       octomap::OcTree tree(c.options.resolution_m);
-      setModel(tree, c.options);
+      setModel(tree);
       double ms = 0;
       for (std::size_t i = 0; i < c.messages.size(); ++i) {
         const double start = threadMs();

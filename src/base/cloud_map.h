@@ -19,10 +19,6 @@ struct CloudMapOptions {
   double resolution_m = 0.05;  ///< edge of a voxel
   double max_range_m = 0;  ///< what is seen further away only clears so far; 0: it fills, and clears MOST_RAY_VOXELS
   double min_range_m = 0;  ///< a point that is nearer to the sensor is no measurement
-  double hit = 0.7;        ///< probability that a voxel is occupied in which a point lies; 0.5 to 1
-  double miss = 0.4;       ///< the same of a voxel that a ray goes through; 0 to 0.5
-  double min = 0.12;       ///< no voxel's probability is taken to be less; 0 to 0.5
-  double max = 0.97;       ///< nor more; 0.5 to 1
   bool no_return_clears = false;  ///< a pixel that is infinite has seen through all that is within the range
   std::optional<Box> box;         ///< [m, map frame] voxels that are not in it, be it in part, stay unknown
 };

@@ -54,10 +54,10 @@ struct CloudMap::Impl {
   ViewReader reader;
 
   explicit Impl(const CloudMapOptions& options) : tree(options.resolution_m) {
-    tree.setProbHit(options.hit);
-    tree.setProbMiss(options.miss);
-    tree.setClampingThresMin(options.min);
-    tree.setClampingThresMax(options.max);
+    tree.setProbHit(tolerance::MAP_HIT);
+    tree.setProbMiss(tolerance::MAP_MISS);
+    tree.setClampingThresMin(tolerance::MAP_LEAST);
+    tree.setClampingThresMax(tolerance::MAP_MOST);
     limits.resolution_m = options.resolution_m;
     limits.voxels_per_m = 1 / options.resolution_m;
     limits.near_m = options.min_range_m;

@@ -88,6 +88,18 @@ class DamagedBagTest(FolderTestCase):
                 ran = self.analyze(half)
                 self.assertEqual(ran.returncode, expected, ran.stderr)
 
+    def test_zeros_beyond_all_memory(self):
+        read = bytearray(self.whole.read_bytes())
+        at = read.index(b'index_pos=') + 10
+        index = struct.unpack_from('<Q', read, at)[0]
+        struct.pack_into('<Q', read, at, 5 << 30)
+        with open(self.folder / 'sparse.bag', 'wb') as sparse:
+            sparse.write(read[:index])
+            sparse.truncate((5 << 30) + 100)
+        ran = self.analyze(self.folder / 'sparse.bag', preexec_fn=limited)
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn('(the record at byte %d is none)' % index, ran.stderr)
+
     def test_lengths_and_places_that_are_wrong(self):
         """rosbag trusts them: it read past its buffers, and was ended by a signal."""
         whole = self.whole.read_bytes()

@@ -106,10 +106,10 @@ Rays allRays(const SensorView& view, const CloudMapOptions& options) {
 class ByVoxels {
  public:
   explicit ByVoxels(const CloudMapOptions& options) : tree_(options.resolution_m) {
-    tree_.setProbHit(options.hit);
-    tree_.setProbMiss(options.miss);
-    tree_.setClampingThresMin(options.min);
-    tree_.setClampingThresMax(options.max);
+    tree_.setProbHit(tolerance::MAP_HIT);
+    tree_.setProbMiss(tolerance::MAP_MISS);
+    tree_.setClampingThresMin(tolerance::MAP_LEAST);
+    tree_.setClampingThresMax(tolerance::MAP_MOST);
   }
   void insert(const Keys& cleared, const Keys& filled) {
     for (const Key& key : cleared) {
