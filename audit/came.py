@@ -398,13 +398,24 @@ def turned(radius, half):
                     for k in range(len(rings) + 1) for i in range(32)]
 
 
+def origin(element):
+    """The pose that an origin of a URDF says, 4 x 4; without one none."""
+    m = np.eye(4)
+    if element is not None:
+        x, (r, p, y) = ([float(w) for w in element.get(name, '0 0 0').split()] for name in ('xyz', 'rpy'))
+        (cr, cp, cy), (sr, sp, sy) = np.cos(np.array([r, p, y]) / 2), np.sin(np.array([r, p, y]) / 2)
+        m[:3, :3] = rotation((sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy))
+        m[:3, 3] = x
+    return m
+
+
 def links(path, files):
     """Each collision element of a URDF: link, positions, surface, lost, whether it is round: then its mesh lies within it."""
     tree = xml.parse(path).getroot()
     for link in tree.findall('link'):
         for element in link.findall('collision'):
             shape = element.find('geometry')[0]
-            numbers = lambda name, default='0 0 0', of=shape: [float(w) for w in of.get(name, default).split()]
+            numbers = lambda name, default='': [float(w) for w in shape.get(name, default).split()]
             if shape.tag == 'mesh':
                 points, surface, lost = files.mesh(shape.get('filename'))
                 points = points * numbers('scale', '1 1 1')
@@ -414,12 +425,8 @@ def links(path, files):
                 surface = Surface(len(points), faces)
             else:
                 raise NotCovered('a link of shape %s' % shape.tag)
-            origin = element.find('origin')
-            if origin is not None:
-                r, p, y = [a / 2 for a in numbers('rpy', of=origin)]
-                (cr, cp, cy), (sr, sp, sy) = np.cos([r, p, y]), np.sin([r, p, y])
-                q = (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
-                points = points @ rotation(q).T + numbers('xyz', of=origin)
+            pose = origin(element.find('origin'))
+            points = points @ pose[:3, :3].T + pose[:3, 3]
             yield link.get('name'), points, surface, lost, shape.tag in ('cylinder', 'sphere')
 
 

@@ -413,6 +413,25 @@ class OnMap:
         return carried(self.transforms.pose(self.fixed, self.frame, stamp), self.track.at(stamp, start, end))
 
 
+class Ahead:
+    """A body where a path has carried it after the step's end."""
+
+    def __init__(self, track, pose, rough):
+        self.track, self.pose, self.rough = track, pose, rough
+
+    def __getattr__(self, name):
+        return getattr(self.track, name)
+
+    def at(self, stamp, start, end):
+        return carried(self.pose, self.track.at(end, start, end))
+
+    def exact(self, start, end):
+        return False
+
+    def loose_at_end(self, start, end):
+        return self.track.loose_at_end(start, end) + self.rough
+
+
 def pieces(tracks, start, end, tolerance):
     """Stamps that cut the step into pieces, each straight for all of the tracks to within the tolerance [m]."""
     stamps = sorted({start, end} | {k for t in tracks for k in t.knots(start, end)})

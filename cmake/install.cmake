@@ -56,7 +56,7 @@ install(DIRECTORY ${TRUE_SOURCE_DIR}/fleet DESTINATION ${CATKIN_PACKAGE_SHARE_DE
 catkin_install_python(PROGRAMS examples/guard_twist.py examples/slow_the_arm.py examples/stop_the_arm.py examples/publish_cloth.py fleet/analyze_fleet src/apps/watch
   audit/audit_bag DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 # The parts of audit_bag lie beside it.
-install(FILES audit/came.py audit/owned.py audit/placed.py audit/touches.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(FILES audit/came.py audit/intended.py audit/owned.py audit/placed.py audit/touches.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 # The demo's recording belongs to a package: who installs one has no checkout, in which scripts/demo would make it.
 if(DEFORMABLE_CCD_RECORD_DEMO)
   set(DEMO_SCENE ${TRUE_SOURCE_DIR}/config/scenes/table_edge.yaml)

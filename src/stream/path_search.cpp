@@ -239,7 +239,6 @@ class Search {
     if (known_s < last_s && here_m > 0) known_s = halved(known_s, open_s, is_enough, 20).first;
     holds_s = std::max(holds_s, known_s);
     if (may_stand) holds_s = std::max(holds_s, pair.stands_s);
-    if (may_stand && holds_s < to_s) holds_s = std::max(holds_s, leaves(pair, to_s));
     return std::min(holds_s, to_s);
   }
 

@@ -11,14 +11,16 @@ from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2, PointField
 from shape_msgs.msg import MeshTriangle
 from tf2_msgs.msg import TFMessage
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import Marker
 
 NS, START = 10 ** 9, 1000 * 10 ** 9
 FINGER = np.array([[-.03, -.03, -.03], [.03, -.03, -.03], [0, .03, -.03], [0, 0, .03]])
 FINGER_OBJ = ''.join('v %r %r %r\n' % tuple(p) for p in FINGER.tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
-ROBOT = ('<robot name="arm"><link name="tool"><collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link><link name="wrist">'
-         '<collision><origin xyz="0 0 0.1" rpy="0.3 0 0"/><geometry><cylinder radius="0.03" length="0.06"/></geometry></collision></link>'
-         '<joint name="j" type="fixed"><parent link="wrist"/><child link="tool"/></joint></robot>')
+ROBOT = ('<robot name="arm"><link name="base"/><link name="tool"><collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link>'
+         '<link name="wrist"><collision><origin xyz="0 0 0.1" rpy="0.3 0 0"/><geometry><cylinder radius="0.03" length="0.06"/></geometry></collision></link>'
+         '<joint name="j" type="floating"><parent link="base"/><child link="tool"/></joint><joint name="swing" type="revolute"><parent link="base"/>'
+         '<child link="wrist"/><origin xyz="0.05 0 0.03"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="9"/></joint></robot>')
 FAULTS = ('damaged', 'lost', 'late', 'twice', 'out of order', 'other stamp', 'elsewhere', 'stops', 'jumps', 'differs', 'other publisher')
 
 
@@ -203,10 +205,31 @@ class World:
         return message
 
     def robot(self):
+        """A tool that flies, and a wrist that swings about the base."""
         r = self.r
+        self.far, self.fast = r.uniform(.2, 1), r.uniform(.5, 4)
+        base = copied(self.mount)
+        base.child_frame_id = 'base'
+        self.add('/tf_static', TFMessage([base]), -.3)
         self.params['robot'] = {'description': self.folder + '/arm.urdf', 'own_voxels_m': 0, 'against_map': r.random() < .5}
         self.tf('tool', self.chain[0], Way(r, .8, True, self.tame))
-        self.tf('wrist', 'world', Way(r, .8, True, self.tame))
+        self.tf('wrist', 'base', self)
+
+    def at(self, at):
+        """Where the wrist is on its base."""
+        angle = self.far * math.sin(self.fast * at)
+        return (.05, 0, .03), (0, math.sin(angle / 2), 0, math.cos(angle / 2))
+
+    def swing(self, r, at):
+        """Where the wrist is to go from then on, or, one of five, something else."""
+        message, off = JointTrajectory(joint_names=['swing']), r.choice([0] * 8 + [.7, math.nan])
+        message.header.stamp = stamp(self.ns(at))
+        speeds, faster = r.choice([(False, False), (True, False), (True, True)])
+        for k in range(r.choice([2, 4, 9])):
+            turns = self.far * np.array([math.sin(self.fast * (at + .1 * k)), math.cos(self.fast * (at + .1 * k))])
+            message.points.append(JointTrajectoryPoint(positions=[turns[0] + off], velocities=[self.fast * turns[1]] * speeds,
+                                                       accelerations=[-self.fast ** 2 * turns[0]] * faster, time_from_start=rospy.Duration(0, k * NS // 10)))
+        self.add('/collision_monitor/intended', message, at, r.uniform(0, .05))
 
     def map(self):
         r = self.r
@@ -264,15 +287,21 @@ class World:
             p['phase'] = r.choice([row['phase'], ''])
 
     def ahead(self, r):
-        """Limits, and twists that the finger is said to go by: some right, some late, some of a frame that is not there."""
+        """Limits, what the finger carries, and twists by which it is said to go: some right, some late, some of a frame that is not there; or of a robot."""
         p = self.params
         if 'max_speed_m_s' not in p or r.random() < .5:
             return
         p['limits'] = {'max_m': r.choice([.1, .3, .5]), 'horizon_s': r.choice([.05, .2])}
-        if 'finger' not in p['bodies'] or r.random() < .5:
+        if 'finger' in p['bodies'] and r.random() < .5:
+            carried = p['bodies'][r.choice([n for n, s in p['bodies'].items() if 'rigid' not in s and 'motion' not in s])]
+            carried.update(carried_by=p['bodies']['finger']['rigid']['frame'], max_relative_speed_m_s=r.choice([.1, .5, 2]))
+        if 'finger' not in p['bodies'] and 'robot' not in p or r.random() < .5:
             return
         p['intent'] = {'horizon_s': r.choice([.1, .5]), 'deviation_m': r.choice([.01, .1]), 'deviation_rate_m_s': r.choice([0, .2])}
         for at in [.05 + .1 * k for k in range(int(10 * self.seconds))]:
+            if 'robot' in p and ('finger' not in p['bodies'] or self.far > .6):
+                self.swing(r, at)
+                continue
             message = TwistStamped()
             message.header.stamp = stamp(self.ns(at - (2 if r.random() < .1 else 0)))
             message.header.frame_id = self.chain[-1] if r.random() < .9 else 'elsewhere'

@@ -145,6 +145,18 @@ TEST(IntendedPath, TowardsTheTableItIsNot) {
   EXPECT_LT(along.scale.scale, 0.2) << along.scale.reason;
 }
 
+TEST(IntendedPath, WhatComesOverSomethingIsNoLongerAsFarFromIt) {
+  // At a constant height, from 0.25 m beside a box to 0.05 m above it, which may rise.
+  Scene over(0.05);
+  over.step.map = {};
+  over.step.bodies.push_back(boxBody("box", {0.3, -0.1, -0.1}, {0.5, 0.1, 0}));
+  over.bounds = {{2.5}, {0.5}};
+  over.goes({0.5, 0, 0}, 0.25).tube(0.001, 0);
+  // At 2 m/s: the root of (0.25 - 2 t)^2 + 0.05^2 is 0.026 + 0.5 t.
+  const double s = over.run().scale.scale, t = s * 0.1 + s * s * 0.15;
+  EXPECT_NEAR(std::hypot(0.25 - 2 * t, 0.05), 0.026 + 0.5 * t, 0.004);
+}
+
 TEST(IntendedPath, TheScaleLetsItStandBeforeItTouches) {
   // 1 m/s towards the table, 0.125 m above it, of which 0.025 m are to be left.
   Scene dive = Scene(0.125).goes({0, 0, -1}, 1);
