@@ -301,22 +301,24 @@ class CellTest(FolderTestCase):
 
     def test_along_a_trajectory(self):
         """Of joints, straight and by splines; where the robot is on it tf says."""
-        def swing(at, k, speeds, faster):
+        def swing(at, n):
             message = JointTrajectory(joint_names=['elbow'])
-            message.header.stamp = at(k)
-            for i in range(5):
-                message.points.append(JointTrajectoryPoint(positions=[.1 * i], velocities=[.5] * speeds, accelerations=[0] * faster,
-                                                           time_from_start=rospy.Duration(0, 2 * 10 ** 8 * i)))
-            return '/collision_monitor/intended', message, at(k)
+            message.header.stamp = at(1)
+            for t in (0, .8):
+                message.points.append(JointTrajectoryPoint(positions=[.6 * t ** n], velocities=[.6 * n * t ** (n - 1)] * (n > 1),
+                                                           accelerations=[12 * t ** 3] * (n > 2), time_from_start=rospy.Duration(t)))
+            return '/collision_monitor/intended', message, at(1)
 
-        def elbow(at, k):
-            turned = transform('elbow', at(k), x=.05, z=.15, w=math.cos(.025 * (k - 1)))
-            turned.transform.rotation.y = math.sin(.025 * (k - 1))
+        def elbow(at, k, n):
+            turned, half = transform('elbow', at(k), x=.05, z=.15), .3 * max(0, (k - 1) / 10) ** n
+            turned.transform.rotation.y, turned.transform.rotation.w = math.sin(half), math.cos(half)
             return '/tf', TFMessage([turned]), at(k)
         (self.folder / 'elbow.urdf').write_text(ELBOW)
-        for kind in ((0, 0), (1, 0), (1, 1)):
-            self.cell('joints', self.INTENT + 'robot: %s/elbow.urdf\n' % self.folder, more=lambda at: [elbow(at, k) for k in range(11)] + [swing(at, 1, *kind)])
-            self.on_the_path(5)
+        for n in (1, 2, 5):  # the angle goes by this power of the time
+            self.cell('joints', self.INTENT + 'robot: %s/elbow.urdf\n' % self.folder,
+                      more=lambda at: [elbow(at, k, n) for k in range(11)] + [swing(at, n)])
+            self.holds()
+        self.on_the_path(5)
 
     def test_what_is_carried(self):
         """The cloth leaves the finger no faster than is said, and both go their way."""
