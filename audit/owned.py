@@ -145,10 +145,14 @@ class Owned:
             far = np.nanmax(touches.length(q - p), initial=0)
             many = 0 if far == 0 else 1 if sure else 1 + int(min(64, 4 * far / resolution))
             within = reach - resolution / 2 - tolerance if sure else reach + 0.8661 * resolution + far / max(1, many) + tolerance
+            both = np.concatenate([p, q])
+            low, high = np.nanmin(both, 0) - within, np.nanmax(both, 0) + within
+            left = np.nonzero(~found & ((middle >= low) & (middle <= high)).all(1))[0]
+            if not len(left):
+                continue
             places = p[elements] + (q - p)[elements] * np.linspace(0, 1, many + 1)[:, None, None, None]
             at = places[np.isfinite(places).all((2, 3))]
-            left = np.nonzero(~found)[0]
-            if not len(at) or not len(left):
+            if not len(at):
                 continue
             which = touches.overlapping(middle[left] - within, middle[left] + within, at.min(1), at.max(1))
             near = touches.point_to_face(middle[left[which[:, 0]]], at[which[:, 1]]) <= within
@@ -211,7 +215,8 @@ class Owned:
             ever = np.append(ever, np.zeros(len(fresh), bool))
             for numbers, since in asked:
                 for name, r in self.reach.items():
-                    ways = self.ways(name, since, m.stamp)
-                    ever[len(ever) - len(numbers):] |= self.reached(name, numbers, ways, back, m.resolution if r == 'auto' else r, m.resolution)
+                    new = len(ever) - len(numbers) + np.nonzero(~ever[len(ever) - len(numbers):])[0]
+                    ways = self.ways(name, since, m.stamp) if len(new) else []
+                    ever[new] = self.reached(name, numbers[new - len(ever)], ways, back, m.resolution if r == 'auto' else r, m.resolution)
             seen, begin, before = asked[0][0], m.stamp, filled
             self.of[m.number] = seen[ever], doubt

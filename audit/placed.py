@@ -44,6 +44,8 @@ class Sample:
 
     def off(self, other):
         """How far the two are apart: metres, and the angle."""
+        if other is self:
+            return 0.0, 0.0
         p, q = (s.rotation / np.linalg.norm(s.rotation) for s in (self, other))
         turn = 2 * np.arcsin(min(1.0, min(np.linalg.norm(p - q), np.linalg.norm(p + q)) / 2)) * 2
         return np.abs(self.translation - other.translation).max(), turn
