@@ -142,7 +142,7 @@ class Owned:
         for p, q, surface in ways:
             elements = surface.faces if len(surface.faces) else surface.edges[:, [0, 1, 1]]
             p, q = placed.carried(back, p), placed.carried(back, q)
-            far = np.nanmax(touches.length(q - p), initial=0)
+            far = np.fmax.reduce(touches.length(q - p), initial=0)
             many = 0 if far == 0 else 1 if sure else 1 + int(min(64, 4 * far / resolution))
             within = reach - resolution / 2 - tolerance if sure else reach + 0.8661 * resolution + far / max(1, many) + tolerance
             both = np.concatenate([p, q])

@@ -81,7 +81,8 @@ class DamagedBagTest(FolderTestCase):
         read = bytearray(half.read_bytes())
         at = read.index(b'index_pos=') + 10
         index = struct.unpack_from('<Q', read, at)[0]
-        for zeros, wrong, expected in ((0, b'', 0), (2000, b'', 0), (3, b'', 1), (2000, b'x', 1)):
+        few = 0 if read[:index].endswith(bytes(8)) else 1  # where that version is, its own lie there already
+        for zeros, wrong, expected in ((0, b'', 0), (2000, b'', 0), (3, b'', few), (2000, b'x', 1)):
             with self.subTest(zeros=zeros, wrong=wrong):
                 struct.pack_into('<Q', read, at, index + zeros + len(wrong))
                 half.write_bytes(read[:index] + zeros * b'\0' + wrong + read[index:])
