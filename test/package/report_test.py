@@ -221,7 +221,7 @@ class ReportPageTest(FolderTestCase):
         usual = 2 * run_data['total']['p95_ms']
         for step in run_data['steps']:  # of which a busy machine may have made some long
             step['ms'] = min(step['ms'] or 0, run_data['total']['p95_ms'])
-        run_data['steps'][30]['ms'] = 1000 * usual
+        run_data['steps'][30].update(ms=1000 * usual, contacts=100000)
         run_data['proof'].update(unproved='why not, ' * 200 + 'and what to do', proved=0)
         self.page = self.own / 'report.html'
         self.page.write_text(before + json.dumps(run_data).replace('<', '\\u003c') + after)
@@ -233,6 +233,7 @@ class ReportPageTest(FolderTestCase):
         heights = [float(y) for y in re.findall(r',([\d.]+)', re.search(r'<polyline points="([^"]*)', plot)[1])]
         self.assertEqual(heights.count(min(heights)), 1)
         self.assertGreater(max(heights) - sorted(heights)[1], 20, 'pixels between the others')
+        self.assertIn('contacts (logarithmic)', body)
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_how_close(self):
