@@ -159,6 +159,12 @@ class ReportPageTest(FolderTestCase):
         actions.perform()
         self.assertRegex(text('picked'), r'^Contact, .*: cloth vert.* \d.*; certain, new\. Time of contact between .* wide\. '
                                          r'Part of patch \d+\.$')
+        # The view fits what moves while something touches, its middle in the middle.
+        box = page.execute_script("const b = document.getElementById('canvas').getBoundingClientRect(); return [b.left, b.right, b.top, b.bottom]")
+        spots = page.execute_script('return player.items().map((_, i) => player.screenOf(i))')
+        for low, high, at in ((*box[:2], [x for x, _ in spots]), (*box[2:], [y for _, y in spots])):
+            self.assertTrue(low < min(at) and max(at) < high, (low, min(at), max(at), high))
+            self.assertLess(abs((min(at) + max(at)) / 2 - (low + high) / 2), (high - low) / 10)
         near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
             return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)
         self.assertIn(text('picked'), near, 'what was clicked, or what lies on the same spot')

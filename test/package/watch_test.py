@@ -135,6 +135,7 @@ class WatchTest(unittest.TestCase):
         wait_for(lambda: 'octomap' in narrow.screen().split('partners')[-1], 20, 'the view of 80 x 24')
         self.assertRegex(narrow.screen(), r'partners +patches +contacts')
         self.assertNotIn('…', narrow.screen(), 'nothing of the table is cut off')
+        self.assertIn('Ctrl-C ends this view', narrow.screen(), 'nor is the end')
         self.assertNotIn('STALE', view.screen())
         screen = view.screen()
         for pattern in (r'PROVED, ', r'reason +\S', r'steps +\d+\.\d a second; from frame to answer \d+\.\d ms',
