@@ -376,6 +376,18 @@ class CommandsTest(unittest.TestCase):
                     self.assertIn(option, text)
 
 
+class DemoTest(unittest.TestCase):
+    def test_it_builds_what_the_readme_types(self):
+        """A reader of it alone has built nothing else."""
+        built = re.search(r'for target in (.*); do', (CHECKOUT / 'scripts/demo').read_text()).group(1).split()
+        typed = [command.split() for command in code_of(CHECKOUT / 'README.md')]
+        names = {words[2] for words in typed if words[:2] == ['rosrun', 'deformable_ccd']} | {'collision_monitor_node' for words in typed if words[0] == 'roslaunch'}
+        programs = [name for name in names if not any((CHECKOUT / folder / name).is_file() for folder in ('src/apps', 'examples'))]
+        self.assertGreater(len(names), len(programs), 'scripts need no build')
+        self.assertGreaterEqual(len(programs), 2)
+        self.assertEqual([name for name in programs if name not in built], [])
+
+
 class TroubleshootingTest(unittest.TestCase):
     def test_every_tested_mistake_is_on_the_page(self):
         page = (CHECKOUT / 'doc/troubleshooting.md').read_text()

@@ -159,6 +159,12 @@ class ReportPageTest(FolderTestCase):
         actions.perform()
         self.assertRegex(text('picked'), r'^Contact, .*: cloth vert.* \d.*; certain, new\. Time of contact between .* wide\. '
                                          r'Part of patch \d+\.$')
+        # The view fits what moves while something touches, its middle in the middle.
+        box = page.execute_script("const b = document.getElementById('canvas').getBoundingClientRect(); return [b.left, b.right, b.top, b.bottom]")
+        spots = page.execute_script('return player.items().map((_, i) => player.screenOf(i))')
+        for low, high, at in ((*box[:2], [x for x, _ in spots]), (*box[2:], [y for _, y in spots])):
+            self.assertTrue(low < min(at) and max(at) < high, (low, min(at), max(at), high))
+            self.assertLess(abs((min(at) + max(at)) / 2 - (low + high) / 2), (high - low) / 10)
         near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
             return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)
         self.assertIn(text('picked'), near, 'what was clicked, or what lies on the same spot')
@@ -221,7 +227,7 @@ class ReportPageTest(FolderTestCase):
         usual = 2 * run_data['total']['p95_ms']
         for step in run_data['steps']:  # of which a busy machine may have made some long
             step['ms'] = min(step['ms'] or 0, run_data['total']['p95_ms'])
-        run_data['steps'][30]['ms'] = 1000 * usual
+        run_data['steps'][30].update(ms=1000 * usual, contacts=100000)
         run_data['proof'].update(unproved='why not, ' * 200 + 'and what to do', proved=0)
         self.page = self.own / 'report.html'
         self.page.write_text(before + json.dumps(run_data).replace('<', '\\u003c') + after)
@@ -233,6 +239,7 @@ class ReportPageTest(FolderTestCase):
         heights = [float(y) for y in re.findall(r',([\d.]+)', re.search(r'<polyline points="([^"]*)', plot)[1])]
         self.assertEqual(heights.count(min(heights)), 1)
         self.assertGreater(max(heights) - sorted(heights)[1], 20, 'pixels between the others')
+        self.assertIn('contacts (logarithmic)', body)
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_how_close(self):

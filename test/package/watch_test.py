@@ -25,9 +25,9 @@ WATCH = CHECKOUT / 'src/apps/watch'
 class Terminal:
     """A program on a terminal, and what it shows."""
 
-    def __init__(self, command, environment, columns=120):
+    def __init__(self, command, environment, rows=40, columns=120):
         own, its = pty.openpty()
-        fcntl.ioctl(its, termios.TIOCSWINSZ, struct.pack('HHHH', 40, columns, 0, 0))
+        fcntl.ioctl(its, termios.TIOCSWINSZ, struct.pack('HHHH', rows, columns, 0, 0))
         self.process = subprocess.Popen(command, env={**environment, 'TERM': 'xterm-256color'}, stdin=its, stdout=its,
                                         stderr=its, start_new_session=True)
         os.close(its)
@@ -117,7 +117,7 @@ class WatchTest(unittest.TestCase):
         self.addCleanup(stop, plain)
         view = Terminal([sys.executable, str(WATCH)], self.environment)
         self.addCleanup(stop, view.process)
-        narrow = Terminal([sys.executable, str(WATCH)], self.environment, 80)
+        narrow = Terminal([sys.executable, str(WATCH)], self.environment, 24, 80)
         self.addCleanup(stop, narrow.process)
 
         def shows(pattern, seconds=40):
@@ -132,9 +132,10 @@ class WatchTest(unittest.TestCase):
         player = self.start('rosbag', 'play', '--quiet', bag)
         # Patches, contacts, expected ones, area, how long, the next one and the newest one.
         shows(r'cloth and octomap +[1-9]\d* +[1-9]\d* +\d+ +\d+\.\d{4} +[\d.]+ m?s +(?:in -?\d+ m?s)? +[\d.]+ m?s ago')
-        wait_for(lambda: 'octomap' in narrow.screen().split('partners')[-1], 20, 'the view of 80 columns')
+        wait_for(lambda: 'octomap' in narrow.screen().split('partners')[-1], 20, 'the view of 80 x 24')
         self.assertRegex(narrow.screen(), r'partners +patches +contacts')
         self.assertNotIn('…', narrow.screen(), 'nothing of the table is cut off')
+        self.assertIn('Ctrl-C ends this view', narrow.screen(), 'nor is the end')
         self.assertNotIn('STALE', view.screen())
         screen = view.screen()
         for pattern in (r'PROVED, ', r'reason +\S', r'steps +\d+\.\d a second; from frame to answer \d+\.\d ms',

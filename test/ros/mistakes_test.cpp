@@ -20,6 +20,7 @@
 #include "octomap/map_builder.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
+#include "ros/support/monitor_fixture.h"
 #include "ros/support/probe.h"
 
 namespace dccd {
@@ -76,6 +77,21 @@ class Mistakes : public ::testing::Test {
     EXPECT_EQ(untold, "");
   }
 
+  /// What a monitor waited for has come: one line says so.
+  void expectOver(const std::string& name, const std::function<void()>& make) {
+    const auto saidAfterAnother = [&] {
+      stamp_s += 0.1;
+      make();
+      ros::WallDuration(0.03).sleep();
+      const auto lines = log.all();
+      return std::count_if(lines.begin(), lines.end(), [&](const rosgraph_msgs::Log& line) {
+        return line.msg == name + ": what it waited for has come";
+      });
+    };
+    EXPECT_TRUE(waitUntil([&] { return saidAfterAnother() > 0; }, 10));
+    for (int more = 0; more < 10; ++more) EXPECT_EQ(saidAfterAnother(), 1);
+  }
+
  private:
   static bool tells(const std::string& text, const Mistake& mistake) {
     return text.find(mistake.what) != std::string::npos && text.find(mistake.advice) != std::string::npos;
@@ -124,10 +140,11 @@ TEST_F(Mistakes, AreToldWithWhatToDo) {
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/map_frame/octomap", true);
   map.publish(mapIn("odom"));
   const auto tip = [&] { return meshStamped(tipAbove(1), stamp_s); };
+  const auto unplaced =
+      sends<MeshStamped>("/no_transform/mesh", [&] { return meshStamped(tipAbove(1), stamp_s, "camera"); });
   const auto grid = [&] { return cloud(gridAt(3, 4, 0), stamp_s); };
   expectTold({
-      {"/no_transform", "no transform from 'camera' to 'world'", "publish it on /tf or /tf_static",
-       sends<MeshStamped>("/no_transform/mesh", [&] { return meshStamped(tipAbove(1), stamp_s, "camera"); })},
+      {"/no_transform", "no transform from 'camera' to 'world'", "publish it on /tf or /tf_static", unplaced},
       {"/wrong_type", "type std_msgs/Bool is not a mesh", "publish deformable_ccd/MeshStamped, geometry_msgs/PoseArray",
        sends<std_msgs::Bool>("/wrong_type/mesh", [] { return std_msgs::Bool(); })},
       {"/swapped", "topology/rows and topology/cols look swapped", "set rows: 3, cols: 4",
@@ -183,6 +200,10 @@ TEST_F(Mistakes, AreToldWithWhatToDo) {
         << line.name << line.msg;
   }
   EXPECT_EQ(waits, 1) << "what may be on its way is no mistake yet";
+
+  const auto tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf_static", true);
+  tf.publish(transformAt(1, "camera", {0, 0, 0}));
+  expectOver("/no_transform", unplaced);
 }
 
 class NoClock : public Mistakes {};
