@@ -18,6 +18,9 @@
 
 namespace dccd {
 
+struct SpeedBound;
+struct SpeedLaw;
+
 /// How frames become steps.
 struct MonitorOptions {
   Options detector;  ///< how a step is answered
@@ -118,6 +121,12 @@ class DCCD_EXPORT Monitor {
   /// fixed one. A step in which one is not known, or off by more than rigid_tolerance_m from where the step has what it
   /// carries, is PARTIAL. Must outlive the monitor. Null, the beginning: what is pushed is all that is known.
   void setTracks(const FrameTracks* tracks);
+  /// From the next step on nobody reads its distances but safeUntil() and speedScale(), by these bounds and this law,
+  /// and who asks which two are nearest over the step. Of a pair that changes nothing of these three, however far it
+  /// is, Outcome::clearances say FARTHER, by as much as that takes.
+  void readDistancesBy(const std::vector<SpeedBound>& bounds, const std::optional<SpeedLaw>& law);
+  /// The beginning.
+  void readAllDistances();
   /// Of such frames those of which a step needs to know: of the map in use, of maps that wait, of static bodies.
   std::set<std::string> heldFrames() const;
   /// ObstacleMap::arrival_ns of the first of the maps that wait for the bodies' frames; none: none does.

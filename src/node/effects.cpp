@@ -51,8 +51,9 @@ void EffectTracker::hearPredictions(bool heard) {
   if (std::exchange(scene_.predictions_heard, heard) != heard) plan_ = EffectPlan(scene_, settings_);
 }
 
-void EffectTracker::hearDistances(bool heard) {
+void EffectTracker::hearDistances(bool heard, bool drawn) {
   const bool wanted = heard || promised_;
+  all_read_ = heard || drawn || settingOf(settings_, Effect::CLEARANCE) == EffectSetting::ON;
   if (std::exchange(scene_.clearance_wanted, wanted) != wanted) plan_ = EffectPlan(scene_, settings_);
 }
 

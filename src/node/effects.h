@@ -27,8 +27,11 @@ class EffectTracker {
   void expectMap();
   /// Whether anybody subscribes to predictions, or they are asked for otherwise.
   void hearPredictions(bool heard);
-  /// Whether anybody subscribes to distances; where something is promised they are wanted all the same.
-  void hearDistances(bool heard);
+  /// Whether anybody subscribes to distances, or to markers, in which those are drawn that there are; where something
+  /// is promised they are wanted all the same.
+  void hearDistances(bool heard, bool drawn = false);
+  /// Somebody may read each of them.
+  bool areAllDistancesRead() const { return all_read_; }
   /// A body has come, or is another one.
   void setBody(std::size_t body, const Body& what);
   /// Sets what the plan decides of a monitor's options. False: they are so already.
@@ -46,7 +49,7 @@ class EffectTracker {
  private:
   EffectScene scene_;
   EffectSettings settings_;
-  bool promised_ = false;
+  bool promised_ = false, all_read_ = true;
   EffectPlan plan_, told_;
 };
 

@@ -183,6 +183,12 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
     monitor_->dropSteps(StepStatus::NO_BODY, missing(body));
   }
   if (resting_) monitor_->dropSteps(StepStatus::DISABLED, "the monitor is disabled");
+  const std::vector<SpeedBound> bounds = speedBounds();
+  if (config_.promises() && !config_.intent && !config_.limits && !effects_.areAllDistancesRead()) {
+    monitor_->readDistancesBy(bounds, config_.speed_law);
+  } else {
+    monitor_->readAllDistances();
+  }
   if (!monitor_->next(now_ns, outcome)) return false;
   if (resting_) return true;
   effects_.learn(outcome);
@@ -192,7 +198,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   // From now on Liveness watches. On a line of its own, so that run_mutants.py finds where the witness ends.
   if (outcome.answered) outcome.claim.answer(Question::NEWEST_FRAME, "");
   if (config_.promises()) {
-    promises_.setBounds(speedBounds());
+    promises_.setBounds(bounds);
     promises_.follow(outcome);
     intended_ = {};
     intended_.along.unused = "no answer";

@@ -307,7 +307,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   }
   if (map_publisher_seen) pipeline.expectMap();
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
-  pipeline.effects().hearDistances(outputs.wantsDistances());
+  pipeline.effects().hearDistances(outputs.wantsDistances(), outputs.wantsMarkers());
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {

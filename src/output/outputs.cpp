@@ -82,6 +82,8 @@ bool Outputs::wantsPrediction() const {
 
 bool Outputs::wantsDistances() const { return clearance_.getNumSubscribers() > 0; }
 
+bool Outputs::wantsMarkers() const { return markers_.getNumSubscribers() > 0; }
+
 void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                 const MarkerConfig& markers, const std::string& frame) {
   if (predicted_.getNumSubscribers() > 0) predicted_.publish(fillContactArray(prediction, bodies, frame, list_));

@@ -35,6 +35,8 @@ class Outputs {
   bool wantsPrediction() const;
   /// Whether anybody listens to distances.
   bool wantsDistances() const;
+  /// Whether anybody listens to markers.
+  bool wantsMarkers() const;
   /// Also one without an answer.
   void publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                          const MarkerConfig& markers, const std::string& frame);

@@ -76,7 +76,7 @@ void History::Impl::prepare(const Step& step, const Options& wanted) {
   prepared.map.set(step.map, wanted.exclude_boxes);
   if (!wanted.clearance.wanted) return;
   if (!clearance) clearance = std::make_unique<ClearanceFinder>();
-  clearance->begin(step, scene, wanted);
+  clearance->begin(step, scene, wanted, readers);
 }
 
 void History::Impl::setOptions(const Options& wanted) {

@@ -22,6 +22,7 @@
 namespace dccd {
 
 class ClearanceFinder;
+class DistanceReaders;
 
 /// Made from options, bodies and map, again when these change. No part of a step changes it.
 struct Prepared {
@@ -85,6 +86,7 @@ struct History::Impl {
 
   Prepared prepared;
   Carried carried;
+  DistanceReaders* readers = nullptr;  // of the next step's distances; null: all are read
 
   // The stages of a part: what each keeps from step to step are buffers, and what it has learnt of the meshes.
   SceneArrays scene;  // the bodies are those that were prepared

@@ -207,7 +207,7 @@ ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& option
       const bool on_map = other == OBSTACLE_BODY;
       const double partner_m_s = on_map ? map_m_s : bounds[other].max_m_s;
       const double radii_m = largestRadius(bodies[link]) + (on_map ? 0 : largestRadius(bodies[other]));
-      const double held_m = (separationOf(outcome, row) + radii_m) * (1 + 1e-9);
+      const double held_m = (separationOf(*outcome.step, row) + radii_m) * (1 + 1e-9);
       if (!std::isfinite(partner_m_s)) {
         result.unknown.push_back(unboundedReason(on_map ? "octomap" : bodies[other].name));
       } else if (start_m == 0) {

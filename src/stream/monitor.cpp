@@ -9,6 +9,7 @@
 
 #include "step/history.h"
 #include "stream/monitor_impl.h"
+#include "stream/read_distances.h"
 #include "stream/seam_reason.h"
 
 namespace dccd {
@@ -221,6 +222,12 @@ void Monitor::setBody(std::size_t body, Body what) {
   m.forgetOwnVoxels(body);
 }
 
+void Monitor::readDistancesBy(const std::vector<SpeedBound>& bounds, const std::optional<SpeedLaw>& law) {
+  impl_->distances_read = DistancesRead{bounds, law};
+}
+
+void Monitor::readAllDistances() { impl_->distances_read.reset(); }
+
 void Monitor::setTracks(const FrameTracks* tracks) { impl_->tracks = tracks; }
 
 std::vector<StampNs> Monitor::stampsToCome() const {
@@ -280,6 +287,9 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   }
   last = nullptr;  // until this one is done
   if (listener) listener->onStep(step, options.detector);
+  std::optional<ReadDistances> readers;
+  if (distances_read) readers.emplace(step, distances_read->bounds, distances_read->law);
+  History::Impl::of(history).readers = readers ? &*readers : nullptr;
   Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;

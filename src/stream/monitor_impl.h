@@ -10,11 +10,13 @@
 #include <map>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "dccd/monitor_extras.h"
 #include "dccd/stream.h"
 #include "stream/own_voxels.h"
 #include "stream/patch_tracker.h"
@@ -30,6 +32,12 @@ struct ToldMaps {
   ObstacleMap map;
   std::size_t count = 0;
   double ms = 0;
+};
+
+/// By whom distances are read, if that is not everybody.
+struct DistancesRead {
+  std::vector<SpeedBound> bounds;
+  std::optional<SpeedLaw> law;
 };
 
 struct Monitor::Impl {
@@ -66,6 +74,7 @@ struct Monitor::Impl {
   StampNs told_from_ns = 0;              // since when the bodies' ways are needed for the map that is told beside steps
   std::vector<std::string> thinned_out;  // of that step, in words
   const FrameTracks* tracks = nullptr;
+  std::optional<DistancesRead> distances_read;
   History history, side_history, doubt_history;  // of steps; of predictions and checks; of voxels in doubt
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none

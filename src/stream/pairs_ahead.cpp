@@ -13,21 +13,21 @@ std::string pairOf(const Outcome& outcome, const Clearance& pair) {
   return nameOf(outcome, pair.body[0]) + " and " + (isItself(pair) ? "itself" : nameOf(outcome, pair.body[1]));
 }
 
-std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+std::vector<SpeedBound> boundsOf(const Step& step, const std::vector<SpeedBound>& given) {
   std::vector<SpeedBound> bounds = given;
-  bounds.resize(outcome.step ? outcome.step->bodies.size() : 0);
+  bounds.resize(step.bodies.size());
   for (std::size_t b = 0; b < bounds.size(); ++b) {
     const auto require = [&](double value, const char* name) {
       if (value >= 0) return;
       std::ostringstream text;
-      text << "the speed bound of body '" << outcome.step->bodies[b].name << "' has " << name << " " << value
+      text << "the speed bound of body '" << step.bodies[b].name << "' has " << name << " " << value
            << "; it must be 0 or more";
       throw std::invalid_argument(text.str());
     };
     require(bounds[b].max_m_s, "max_m_s");
     require(bounds[b].relative_m_s, "relative_m_s");
     if (bounds[b].carrier >= bounds.size()) bounds[b].carrier = SpeedBound::NO_CARRIER;  // it is not there
-    const Body& body = outcome.step->bodies[b];
+    const Body& body = step.bodies[b];
     if (body.motion == BodyMotionKind::STATIC && body.turns) bounds[b] = {};  // its frame takes it along
   }
   return bounds;
@@ -46,8 +46,8 @@ bool counts(const Outcome& outcome, const Clearance& pair) {
   return !pair.expected && !mapless;
 }
 
-double separationOf(const Outcome& outcome, const Clearance& pair) {
-  const std::vector<Body>& bodies = outcome.step->bodies;
+double separationOf(const Step& step, const Clearance& pair) {
+  const std::vector<Body>& bodies = step.bodies;
   const auto [a, b] = pair.body;
   return b == OBSTACLE_BODY ? separationFromMap(bodies[a]) : separationBetween(bodies[a], a, bodies[b], b);
 }
@@ -56,12 +56,12 @@ double distanceOf(const Outcome& outcome, const Insides& insides, const Clearanc
   const ClearanceStatus status = pair.at_end.status;
   if (status == ClearanceStatus::TOUCHING || status == ClearanceStatus::UNKNOWN) return 0;
   if (insides.hold(pair)) return 0;
-  const double separation_m = separationOf(outcome, pair), rest_m = pair.at_end.lower_m - separation_m;
+  const double separation_m = separationOf(*outcome.step, pair), rest_m = pair.at_end.lower_m - separation_m;
   if (!(rest_m > 0) || !std::isfinite(rest_m)) return 0;
   return separation_m > 0 ? roundedDown(rest_m) : rest_m;
 }
 
-Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
+Speeds speedsOf(const Step& step, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
   const auto isCarried = [&](std::uint16_t body) { return bounds[body].carrier != SpeedBound::NO_CARRIER; };
   const auto frameOf = [&](std::uint16_t body) { return isCarried(body) ? bounds[body].carrier : body; };
   const auto slows = [&](std::size_t body) { return bounds[body].slows_down && bounds[body].max_m_s > 0; };
@@ -69,14 +69,14 @@ Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector
     Speeds speeds;
     for (const std::uint16_t body : pair.body) {
       if (body == OBSTACLE_BODY) {
-        if (outcome.step->map.way.empty()) continue;  // it stays
+        if (step.map.way.empty()) continue;  // it stays
         speeds.unbounded = "octomap";
         speeds.other = SpeedBound::NONE;
         continue;
       }
       const double bound = boundOf(body);
       double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
-      if (!std::isfinite(bound)) speeds.unbounded = outcome.step->bodies[body].name;
+      if (!std::isfinite(bound)) speeds.unbounded = step.bodies[body].name;
       sum = sum == 0 ? bound : roundedUp(sum + bound);
       speeds.slows = speeds.slows || slows(body) || slows(frameOf(body));  // what swings on goes with its carrier
     }

@@ -34,7 +34,10 @@ std::string pairOf(const Outcome& outcome, const Clearance& pair);
 inline bool isItself(const Clearance& pair) { return pair.body[0] == pair.body[1]; }
 
 /// By body of the step. Throws std::invalid_argument naming the body whose bound is NaN or below 0.
-std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given);
+std::vector<SpeedBound> boundsOf(const Step& step, const std::vector<SpeedBound>& given);
+inline std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+  return outcome.step ? boundsOf(*outcome.step, given) : std::vector<SpeedBound>();
+}
 
 /// Why the outcome allows no promise whatever its distances are; empty: it does.
 std::string whyNone(const Outcome& outcome);
@@ -85,7 +88,7 @@ class Insides {
 };
 
 /// What the two are held apart (minimum separation) [m].
-double separationOf(const Outcome& outcome, const Clearance& pair);
+double separationOf(const Step& step, const Clearance& pair);
 /// What is certainly between the two at the step's end until they touch [m]; 0: nothing, or nobody knows.
 double distanceOf(const Outcome& outcome, const Insides& insides, const Clearance& pair);
 
@@ -97,7 +100,7 @@ struct Speeds {
   /// Of both together, rounded up.
   double closing() const { return slowed > 0 && other > 0 ? roundedUp(slowed + other) : slowed + other; }
 };
-Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds);
+Speeds speedsOf(const Step& step, const Clearance& pair, const std::vector<SpeedBound>& bounds);
 
 std::string unboundedReason(const std::string& body);
 /// Why the distance of the two is taken for 0.

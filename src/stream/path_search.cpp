@@ -87,7 +87,7 @@ class Search {
       pair.body = row.body;
       pair.number = number;
       pair.start_m = distanceOf(outcome_, insides, row);
-      const Speeds speeds = speedsOf(outcome_, row, bounds_);
+      const Speeds speeds = speedsOf(*outcome_.step, row, bounds_);
       const bool is_known = speeds.unbounded.empty() && pair.start_m > 0;
       if (is_known) pair.apart_s = secondsTo(pair.start_m, speeds.closing());
       double allowed = 1;
@@ -115,7 +115,7 @@ class Search {
         off_path_scale_ = std::min(off_path_scale_, allowed);
         return;
       }
-      pair.separation_m = separationOf(outcome_, row);
+      pair.separation_m = separationOf(*outcome_.step, row);
       pair.touches = row.at_end.status == ClearanceStatus::TOUCHING;
       pair.most_m = std::max(pair.start_m, row.at_end.upper_m);
       pair.deviation_m = static_cast<double>(pair.on_path) * path_.deviation_m;

@@ -92,7 +92,7 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
   bool first = true;
   forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
     if (!counts(outcome, pair)) return;
-    const Speeds speeds = speedsOf(outcome, pair, bounds);
+    const Speeds speeds = speedsOf(*outcome.step, pair, bounds);
     const double distance_m = distanceOf(outcome, insides, pair);
     const double closing_m_s = speeds.closing();
     const bool nothing = distance_m == 0 || !std::isfinite(closing_m_s);
@@ -239,7 +239,7 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
   const Insides insides(outcome);
   forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
     if (!counts(outcome, pair) || isItself(pair)) return;
-    const Speeds speeds = speedsOf(outcome, pair, bounds);
+    const Speeds speeds = speedsOf(*outcome.step, pair, bounds);
     if (!speeds.slows) return;
     const double distance_m = distanceOf(outcome, insides, pair);
     const bool bounded = speeds.unbounded.empty();

@@ -154,12 +154,44 @@ void ClearanceFinder::addPart(const ClearancePart& part) {
 }
 
 void ClearanceFinder::searchRows(const ClearancePart& stretch) {
+  // What is known of several stretches depends on each, and boxes of another frame are made for the map.
+  if (readers_ && stretch.count == 1 && isFixed(stretch.step.map)) return searchWhatIsRead(stretch);
   // The map's rows last: they may want the boxes of another frame.
   for (const bool maps : {false, true}) {
     for (Row& row : rows_) {
       if ((row.answer.body[1] == OBSTACLE_BODY) == maps) search(row, stretch);
     }
   }
+}
+
+/// Those first that were nearest in the step before: by them is seen what nobody reads.
+void ClearanceFinder::searchWhatIsRead(const ClearancePart& step) {
+  std::vector<Row*> rows;
+  for (Row& row : rows_) rows.push_back(&row);
+  std::stable_sort(rows.begin(), rows.end(), [&](const Row* x, const Row* y) { return before(*x) < before(*y); });
+  for (Row* row : rows) {
+    const auto [a, b] = row->answer.body;
+    const bool is_told = a != b && !row->answer.expected;
+    if (is_told) {
+      const double enough_m = readers_->enoughFor(a, b);
+      // What was nearer a step ago is measured at once.
+      if (enough_m > 0 && before(*row) > enough_m) row->enough_m = enough_m;
+    }
+    search(*row, step);
+    before(*row) = row->over_step.upper_m;
+    if (is_told) readers_->take(a, b, row->at_end.upper_m, row->over_step.upper_m);
+  }
+}
+
+/// Whether it is shown that nobody reads more of the two; limit_m: from where on.
+bool ClearanceFinder::isBeyondEnough(Row& row, const ClearancePart& stretch, double limit_m) {
+  NearestSearch::Goal goal{options_.tolerance_m, limit_m, false, stretch.deadline};
+  goal.gives_up_m = limit_m;
+  const FoundDistance found = measure(row, stretch, goal, {});
+  if (!(found.lower_m >= limit_m)) return false;
+  row.at_end.lower_m = found.lower_m;
+  row.over_step.lower_m = std::max(0.0, found.lower_m - leavesArcsBy(row));
+  return true;
 }
 
 /// What of it lies in the whole step.
@@ -263,12 +295,17 @@ bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& stretch, doub
 void ClearanceFinder::search(Row& row, const ClearancePart& stretch) {
   const auto [a, b] = row.answer.body;
   const bool on_map = b == OBSTACLE_BODY, last = stretch.index + 1 == stretch.count;
-  const double limit_m = limitOverStep(row);
+  double limit_m = limitOverStep(row);
   if (needsNoSearch(row, stretch, limit_m)) return;
   const bool moved = on_map && !isFixed(stretch.step.map);
   if (!fit(a, stretch, moved) || (!on_map && a != b && !fit(b, stretch, false))) {
     row.unknown = true;
     return;
+  }
+  if (row.enough_m < options_.max_m) {
+    if (isBeyondEnough(row, stretch, limit_m)) return;
+    row.enough_m = std::numeric_limits<double>::infinity();
+    limit_m = limitOverStep(row);
   }
   NearestSearch::Goal goal{options_.tolerance_m, limit_m, false, stretch.deadline};
   std::array<std::uint32_t, 2> nearest{};

@@ -9,6 +9,7 @@
 
 #include "culling/scene_arrays.h"
 #include "dccd/detect.h"
+#include "step/clearance/distance_readers.h"
 #include "step/clearance/feature_tree.h"
 #include "step/clearance/map_boxes.h"
 #include "step/clearance/nearest_search.h"
@@ -37,7 +38,8 @@ class DCCD_HIDDEN ClearanceFinder {
   static constexpr std::size_t MOST_ROWS = 1000;
 
   /// The pairs of a step, what the bodies make unknown, and what is made once for many steps. Before its parts.
-  void begin(const Step& step, const SceneArrays& scene, const Options& options);
+  /// `readers`: of a pair that is farther than these need it is told that it is FARTHER than that. Null: all is read.
+  void begin(const Step& step, const SceneArrays& scene, const Options& options, DistanceReaders* readers);
   /// In order.
   void addPart(const ClearancePart& part);
   /// Once no more parts come: of a step of `parts` those that did not come leave all unknown that they could change.
@@ -68,7 +70,8 @@ class DCCD_HIDDEN ClearanceFinder {
     bool unknown = false;                     // something of the two was never looked at
     bool touches = false, undecided = false;  // the step has such a contact
     FoundDistance at_end, over_step;
-    std::size_t stretches = 0;  // that it was looked for in
+    std::size_t stretches = 0;                                  // that it was looked for in
+    double enough_m = std::numeric_limits<double>::infinity();  // what is farther is FARTHER, below limitOf()
   };
 
   /// In row_of_, beside the numbers of rows.
@@ -97,6 +100,9 @@ class DCCD_HIDDEN ClearanceFinder {
   bool fit(std::size_t body, const ClearancePart& stretch, bool to_map);
   bool needsNoSearch(Row& row, const ClearancePart& stretch, double limit_m);
   void searchRows(const ClearancePart& stretch);
+  void searchWhatIsRead(const ClearancePart& step);
+  double& before(const Row& row);
+  bool isBeyondEnough(Row& row, const ClearancePart& stretch, double limit_m);
   void search(Row& row, const ClearancePart& stretch);
   bool takeOverStep(Row& row, const ClearancePart& stretch, const FoundDistance& found);
   bool isStillFar(std::size_t body, const ClearancePart& part, double limit_m) const;
@@ -108,6 +114,8 @@ class DCCD_HIDDEN ClearanceFinder {
 
   const Step* step_ = nullptr;  // all of it, while it is computed
   ClearanceOptions options_;
+  DistanceReaders* readers_ = nullptr;
+  std::vector<double> before_m_;  // as row_of_: no farther in the step before; infinite: nobody knows
   double rigid_tolerance_m_ = 0;
   std::size_t needed_ = 1;     // stretches of the step in which what turns goes straight enough
   std::size_t stretches_ = 1;  // of each part

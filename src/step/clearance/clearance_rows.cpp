@@ -24,7 +24,8 @@ double limitBefore(double limit_m, double leaves_m) {
 
 }  // namespace
 
-void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Options& options) {
+void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Options& options,
+                            DistanceReaders* readers) {
   step_ = &step;
   options_ = options.clearance;
   rigid_tolerance_m_ = options.rigid_tolerance_m;
@@ -35,6 +36,7 @@ void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Op
   bodies_.resize(n);
   rows_.clear();
   row_of_.assign(n * (n + 1), NOT_ASKED);
+  before_m_.resize(row_of_.size(), std::numeric_limits<double>::infinity());
   pairs_ = came_ = 0;
   expected_ = options.expected;
   for (std::size_t b = 0; b < n; ++b) learn(step.bodies[b], scene.bodies()[b], bodies_[b]);
@@ -49,6 +51,7 @@ void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Op
     }
     if (meetsMap(step.bodies[a]) && (step.map.surface || options.obstacle_expected)) ask(a, n);
   }
+  readers_ = pairs_ <= MOST_ROWS ? readers : nullptr;  // else one row stands for others, which are as far
   std::vector<bool> lost;
   for (const Body& body : step.bodies) lost.push_back(body.dropped_faces > 0 || looseVertices(body) > 0);
   for (std::size_t a = 0; a < n; ++a) {
@@ -64,6 +67,10 @@ std::int32_t& ClearanceFinder::placeOf(std::size_t a, std::size_t b) {
   const std::size_t n = bodies_.size();
   if (a > b) std::swap(a, b);
   return row_of_[a * (n + 1) + std::min(b, n)];
+}
+
+double& ClearanceFinder::before(const Row& row) {
+  return before_m_[static_cast<std::size_t>(&placeOf(row.answer.body[0], row.answer.body[1]) - row_of_.data())];
 }
 
 /// Of a pair that was far in all parts that came.
@@ -109,7 +116,8 @@ ClearanceFinder::Row* ClearanceFinder::rowOf(std::size_t a, std::size_t b) {
 
 double ClearanceFinder::limitOf(const Row& row) const {
   const bool itself = row.answer.body[0] == row.answer.body[1];
-  return itself ? std::min(options_.max_m, tolerance::CLEARANCE_SELF * options_.self_m) : options_.max_m;
+  const double most_m = itself ? std::min(options_.max_m, tolerance::CLEARANCE_SELF * options_.self_m) : options_.max_m;
+  return std::min(most_m, row.enough_m);
 }
 
 /// How much nearer the two may be than where they were seen.

@@ -1,11 +1,14 @@
 // When distances are measured, and what is said where they are not known.
 #include <cmath>
+#include <fstream>
 
 #include <gtest/gtest.h>
 
 #include "output/clearance_messages.h"
 #include "output/output_messages.h"
+#include "support/closed_meshes.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
+#include "unit/ros/stl_text.h"
 
 namespace dccd {
 namespace test {
@@ -49,6 +52,39 @@ TEST(Distances, AreMeasuredWhileSomebodyAsksForThem) {
   never.giveMap(1);
   never.feed(1, 0.5f);
   EXPECT_TRUE(never.feed(1.1, 0.375f).clearances.empty());
+}
+
+// The finger is 0.8 m away, the map 0.25 m: a promise needs no more of the finger than that it is farther.
+TEST(Distances, OfAPromiseAloneThoseThatTellItAreMeasured) {
+  const std::string file = ::testing::TempDir() + "finger.stl";
+  std::ofstream(file) << stlText(box({-0.01, -0.01, 0}, {0.01, 0.01, 0.04}));
+  const std::string bodies =
+      "max_speed_m_s: 1.0, speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}, clearance: {max_m: 2.0}, "
+      "bodies: {cloth: {topic: cloth}, finger: {rigid: {frame: finger, mesh: '" +
+      file + "'}}}";
+  const auto rows = [&](const std::string& more, const auto& prepare) {
+    Driven driven(scene(bodies + more));
+    driven.raise("finger", 1);
+    driven.giveMap(1);
+    prepare(driven.pipeline.effects());
+    for (int k = 0; k < 4; ++k) driven.feed(1 + 0.1 * k, 0.25f + 0.01f * static_cast<float>(3 - k));
+    std::vector<ClearanceStatus> rows;
+    for (const Clearance& row : driven.outcome.clearances) rows.push_back(row.at_end.status);
+    const SafeUntil& promise = driven.pipeline.promises().promise();
+    EXPECT_EQ(promise.limiting, 1u);
+    EXPECT_NEAR(promise.seconds(), 0.25, 1e-3);
+    return rows;
+  };
+  using Status = ClearanceStatus;
+  const std::vector<Status> all{Status::MEASURED, Status::MEASURED, Status::MEASURED},
+      few{Status::FARTHER, Status::MEASURED, Status::FARTHER};
+  EXPECT_EQ(rows("", [](EffectTracker& effects) { effects.hearDistances(false); }), few);
+  EXPECT_EQ(rows("", [](EffectTracker& effects) { effects.hearDistances(true); }), all);
+  EXPECT_EQ(rows("", [](EffectTracker& effects) { effects.hearDistances(false, true); }), all);
+  EXPECT_EQ(rows("", [](EffectTracker&) {}), all) << "as in analyze_bag";
+  const auto nobody = [](EffectTracker& effects) { effects.hearDistances(false); };
+  EXPECT_EQ(rows(", effects: {clearance: 'on'}", nobody), all);
+  EXPECT_EQ(rows(", limits: {max_m: 0.3, horizon_s: 0.1}", nobody), all);
 }
 
 // Live reconfiguration knows nothing of what the plan decides.
