@@ -436,10 +436,11 @@ def draw(data, folder, answers):
     recorded = data / 'recordings'
     figure = np.load(recorded / 'samba/positions.npy').astype(float)
     pictures, k = depth_pictures(data)
-    low, high = came.octomap((recorded / 'maps/fr_079.bt').read_bytes(), True, 'OcTree', 0).boxes()
+    tree = came.octomap((recorded / 'maps/fr_079.bt').read_bytes(), True, 'OcTree', 0)
+    middles = (tree.corners - 32768 + tree.sizes[:, None] / 2) * tree.resolution
     with rosbag.Bag(str(folder / 'fr_079.bag')) as bag:
         rope = np.array([[(p.x, p.y, p.z) for p in m.vertices] for _, m, _ in bag.read_messages('/mesh')])
-    recordings_pictures.draw_said(folder / 'recordings_said.png', lambda s: figure[int(round(25 * s))], answers, rope, (low + high) / 2)
+    recordings_pictures.draw_said(folder / 'recordings_said.png', lambda s: figure[int(round(25 * s))], answers, rope, middles)
     recordings_pictures.draw_blind(folder / 'recordings_blind.png', pictures[0], k, figure, np.load(recorded / 'tshirt/positions.npy')[:2])
 
 

@@ -64,14 +64,27 @@ def from_folder(folder):
     return np.array(frames), cells
 
 
+def numbers(load):
+    """An array of numbers; None: of anything else, as Python's objects, which are not read."""
+    try:
+        array = load()
+    except ValueError:
+        return None
+    return array if array.dtype.kind in 'fiu' else None
+
+
 def from_archive(path):
     """Frames, triangles and lines, and times of an .npz; the latter may be missing. Edges beside faces are the faces' own."""
-    arrays = np.load(path)
-    frames = [name for name in arrays.files if arrays[name].ndim == 3 and arrays[name].shape[2] == 3]
+    archive = np.load(path)
+    arrays = {name: numbers(lambda name=name: archive[name]) for name in archive.files}
+    frames = [name for name, array in arrays.items() if array is not None and array.ndim == 3 and array.shape[2] == 3]
     if len(frames) != 1:
         sys.exit('%s: has %s of frames x vertices x 3; one is needed' % (path, ' and '.join(frames) or 'no array'))
-    one_of = lambda names, otherwise: next((arrays[name] for name in names if name in arrays.files), otherwise)
+    one_of = lambda names, otherwise: next((arrays[name] for name in names if arrays.get(name) is not None), otherwise)
     faces, edges = one_of(('faces', 'triangles'), np.empty((0, 3), int)), one_of(('edges', 'lines'), np.empty((0, 2), int))
+    for corners, count in ((faces, 3), (edges, 2)):
+        if corners.ndim != 2 or corners.shape[1] != count or corners.dtype.kind == 'f':
+            sys.exit('%s: faces are whole numbers of faces x 3, and edges of edges x 2' % path)
     return arrays[frames[0]], (faces, edges[:0] if len(faces) else edges), one_of(('times', 'time'), None)
 
 
@@ -83,7 +96,9 @@ def read(arguments):
     elif path.suffix == '.npz':
         frames, cells, times = from_archive(path)
     else:
-        frames = np.load(path)
+        frames = numbers(lambda: np.load(path))
+        if frames is None:
+            sys.exit('%s: is no array of numbers' % path)
     if frames.ndim != 3 or frames.shape[2] != 3 or frames.shape[1] == 0:
         sys.exit('%s: is an array of %s; frames x vertices x 3 is needed' % (path, ' x '.join(map(str, frames.shape))))
     if arguments.topology:

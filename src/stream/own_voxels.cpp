@@ -158,7 +158,11 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
   // By a map without anything free no ray went there, and a body may hide it.
   const bool may_hide = !look.change.known && voxel.state == VoxelState::DOUBT && if_free != VoxelEvent::FREE_ALONE;
   const bool is_free = !voxel.shown && look.change.isFree(cube.leaf) && !may_hide;
-  voxel.state = nextState(voxel.state, is_free ? if_free : look.occupied(cube, owners));
+  const bool was_left = voxel.state == VoxelState::LEFT || voxel.state == VoxelState::LEFT_SEEN;
+  const bool is_over = was_left && look.map.stamp_ns - voxel.left_ns > nanoseconds(tolerance::OWN_GAP_S);
+  const VoxelEvent if_occupied = is_over ? VoxelEvent::OCCUPIED_WITH_OTHER : look.occupied(cube, owners);
+  voxel.state = nextState(voxel.state, is_free ? if_free : if_occupied);
+  if (!was_left) voxel.left_ns = look.map.stamp_ns;
   if (voxel.state == VoxelState::OWN) {
     voxel.owners = owners;
   } else if (voxel.state == VoxelState::FREE || voxel.state == VoxelState::UNKNOWN ||
@@ -179,7 +183,9 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
   for (const auto& [key, voxel] : stated_) {
     if (voxel.shown && voxel.state == VoxelState::OWN) own.push_back(key);
   }
-  const StampNs now_ns = look.map.stamp_ns, since_ns = now_ns - nanoseconds(tolerance::OWN_GROWTH_S);
+  const StampNs now_ns = look.map.stamp_ns;
+  // Where maps are seldom what was added with the last one counts, too.
+  const StampNs since_ns = std::min(now_ns - nanoseconds(tolerance::OWN_GROWTH_S), before_last_ns_ - 1);
   growth_.keep(look.change.now, look.change.before, since_ns, now_ns);
   std::vector<Growth::Seed> seeds = growth_.beside(appeared, true);
   const std::vector<Growth::Seed> obstacles = growth_.beside(own, false);
@@ -192,8 +198,8 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
     outside.push_back(asked[i]);
   }
   std::unordered_set<std::uint64_t> grew;
-  for (const Growth::Seed& one : growth_.touched(appeared, std::move(seeds))) {
-    growth_.add(one.voxel, true, one.free_ns, now_ns);  // what grew on goes by what it grew from
+  for (const Growth::Seed& one : renewed(growth_.touched(appeared, std::move(seeds)), look)) {
+    growth_.add(one.voxel, true, one.free_ns, now_ns);
     grew.insert(packed(one.voxel.min));
   }
   for (Stated& voxel : look.appeared) {
@@ -206,6 +212,20 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
   }
   seen_alone_ = std::move(look.seen_alone);
   listEntered(look, bodies, std::move(outside));
+}
+
+/// What grew on goes by what it grew from: a body that moves comes to more and more voxels. But where it was within
+/// reach a gap ago already, something came to the body.
+std::vector<Growth::Seed> OwnVoxelFinder::renewed(std::vector<Growth::Seed> grown, const Look& look) const {
+  const PastLook* const past = past_.empty() ? nullptr : &past_.front();
+  if (!past || past->stamp_ns > look.map.stamp_ns - nanoseconds(tolerance::OWN_GAP_S)) return grown;
+  std::vector<OccupiedLeaf> voxels;
+  for (const Growth::Seed& one : grown) voxels.push_back(one.voxel);
+  const std::vector<ReachedCube> cubes = look.reached(voxels, past->bodies, past->ways);
+  for (std::size_t i = 0; i < cubes.size(); ++i) {
+    if (!cubes[i].near.empty()) grown[i].free_ns = before_ns_;
+  }
+  return grown;
 }
 
 /// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
@@ -333,7 +353,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   frame_id_ = map.frame_id;
   before_ = map.surface;
   known_before_ = map.known;
-  before_ns_ = map.stamp_ns;
+  before_last_ns_ = std::exchange(before_ns_, map.stamp_ns);
   if (map.number > number_ + 1) why_lost_.clear();
   number_ = map.number;
 

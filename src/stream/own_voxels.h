@@ -61,9 +61,10 @@ class OwnVoxelFinder {
   struct Stated {
     VoxelKey key;
     VoxelState state;
-    BodySet owners;     // of what is in doubt: who was near, for the sentence
-    bool shown = true;  // the last map did
-    bool grew = false;  // it came from outside of every reach: own voxels beside it may hold more of it
+    BodySet owners;       // of what is in doubt: who was near, for the sentence
+    bool shown = true;    // the last map did
+    bool grew = false;    // it came from outside of every reach: own voxels beside it may hold more of it
+    StampNs left_ns = 0;  // since when it is LEFT or LEFT_SEEN
   };
   /// What a map's maker saw, not often enough for an obstacle, with nobody within reach: packed, and whether in more
   /// than one map. One is a sensor's noise where a body comes next; what was seen again is there, whoever comes.
@@ -91,6 +92,7 @@ class OwnVoxelFinder {
   void listLeftOut(Look& look) const;
   void askUnseen(Look& look, const std::vector<TrackedBody>& there, const std::vector<BodyWay>& ways_there);
   void stateWhatAppeared(Look& look, const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways);
+  std::vector<Growth::Seed> renewed(std::vector<Growth::Seed> grown, const Look& look) const;
   void listEntered(const Look& look, const std::vector<TrackedBody>& bodies, std::vector<OccupiedLeaf> from);
   /// Which maps came between the last one and this one, in words.
   std::string gapBefore(const ObstacleMap& map) const;
@@ -100,7 +102,7 @@ class OwnVoxelFinder {
 
   std::shared_ptr<const VoxelSurface> before_;      // as it was given; null: none
   std::shared_ptr<const KnownSpace> known_before_;  // null: what is not occupied there is free
-  StampNs before_ns_ = 0;
+  StampNs before_ns_ = 0, before_last_ns_ = 0;      // the stamps of the last two maps
   std::string frame_id_;
   Eigen::Isometry3d map_from_fixed_ = Eigen::Isometry3d::Identity();  // of the first map
   std::unordered_map<std::uint64_t, Stated> stated_;                  // by the voxel's packed key

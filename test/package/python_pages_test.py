@@ -168,7 +168,7 @@ class ExamplesTest(PythonTestCase):
         meshio.write(mesh, meshio.Mesh(frames[0], [('triangle', FACES.astype('i4'))]))
         np.save(self.folder / 'a.npy', frames)
         self.assertRegex(self.recorded(self.folder / 'a.npy', '--topology', mesh), '5 frames of 6 vertices, 2 faces and 0 lines')
-        np.savez(self.folder / 'a.npz', positions=1000 * self.falling(), faces=FACES, times=np.arange(5) / 10)
+        np.savez(self.folder / 'a.npz', positions=1000 * self.falling(), faces=FACES, times=np.arange(5) / 10, about=np.array({}))
         self.recorded(self.folder / 'a.npz', '--scale', 0.001, '--topic', '/cloth', '--frame', 'camera')
         rows = (self.folder / 'report/steps.csv').read_text().splitlines()
         self.assertIn('1300000000', rows[4].split(',')[2], 'the times of the archive, after a second')
@@ -222,10 +222,14 @@ class ExamplesTest(PythonTestCase):
         np.save(self.folder / 'flat.npy', np.zeros((5, 6)))
         np.savez(self.folder / 'none.npz', a=np.zeros(3))
         np.save(self.folder / 'few.npy', np.zeros((5, 2, 3)))
+        np.save(self.folder / 'objects.npy', np.array([{}]), allow_pickle=True)
+        np.savez(self.folder / 'quads.npz', positions=np.zeros((5, 4, 3)), faces=[[0, 1, 2, 3]])
         mesh = self.folder / 'larger.ply'
         meshio.write(mesh, meshio.Mesh(two_triangles()[0], [('triangle', FACES.astype('i4'))]))
         for words, said in (([self.folder / 'flat.npy'], 'is an array of 5 x 6; frames x vertices x 3 is needed'),
                             ([self.folder / 'none.npz'], 'has no array of frames x vertices x 3'),
+                            ([self.folder / 'objects.npy'], 'objects.npy: is no array of numbers'),
+                            ([self.folder / 'quads.npz'], 'quads.npz: faces are whole numbers of faces x 3'),
                             ([self.folder / 'few.npy', '--topology', mesh], 'a face names vertex 5, and there are 2')):
             ran = run(sys.executable, EXAMPLES / 'bag_from_arrays.py', words[0], self.folder / 'no.bag', *words[1:])
             self.assertEqual(ran.returncode, 1)

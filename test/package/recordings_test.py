@@ -58,10 +58,11 @@ class RecordingsTest(FolderTestCase):
             self.assertRegex(' '.join(pool.apply(recordings.decide, ((shirt, lie, step),))[1]), 'are not listed')
 
     def test_a_captured_figure(self):
-        row = self.measured('samba', most=('--brute', '0', '--audited', '1'))['samba']
+        row = self.measured('samba', 'maps', most=('--brute', '0', '--audited', '1', '--frames', '160'))['samba']
         self.assertEqual((row['steps'], row['proved']), (59, 59))
         self.assertGreater(row['claims'], 0)
         self.assertGreater(row['contacts'], 1000)
+        self.assertLess({'recordings_said.png', 'recordings_blind.png'}, {p.name for p in self.folder.iterdir()}, 'the pictures of the page')
 
     def test_a_real_camera(self):
         row = self.measured('shirt_depth')['shirt_depth']

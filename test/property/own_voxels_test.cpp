@@ -78,9 +78,10 @@ struct State {
   StampNs grew_ns = -1;    // since when it makes what appears beside it doubtful; -1: it does not
   bool is_marked = false;  // the same, shown free with a body near; else by resolved()
   bool is_seen = false;    // of LEFT: one look found something there
+  StampNs left_ns = -1;    // the same: since when
   friend bool operator<(const State& a, const State& b) {
-    return std::tie(a.kind, a.owners, a.since_ns, a.grew_ns, a.is_marked, a.is_seen) <
-           std::tie(b.kind, b.owners, b.since_ns, b.grew_ns, b.is_marked, b.is_seen);
+    return std::tie(a.kind, a.owners, a.since_ns, a.grew_ns, a.is_marked, a.is_seen, a.left_ns) <
+           std::tie(b.kind, b.owners, b.since_ns, b.grew_ns, b.is_marked, b.is_seen, b.left_ns);
   }
 };
 
@@ -222,6 +223,7 @@ class Model {
     past_.push_back(here_);
     known_ = look.occupied;
     known_.insert(look.free.begin(), look.free.end());
+    before_last_ns_ = before_ns_.value_or(0);
     before_ns_ = look.stamp_ns;
   }
 
@@ -232,6 +234,7 @@ class Model {
   const std::set<Cell> trusted_;
   std::map<Cell, std::set<State>> states_;
   std::optional<StampNs> before_ns_;
+  StampNs before_last_ns_ = 0;
   bool any_seam_ = false;
   struct Past {
     StampNs stamp_ns;
@@ -281,11 +284,19 @@ class Model {
         owners &= ~away;
         if (owners != 0) return {Kind::OWN, owners, *before_ns_};
         return {alone ? Kind::OBSTACLE : Kind::DOUBT, 0, *before_ns_, *before_ns_};
-      case Kind::OWN:
       case Kind::LEFT:
+        if (look.stamp_ns - state.left_ns > 500 * MS) return {Kind::DOUBT, 0, state.since_ns};
+        [[fallthrough]];
+      case Kind::OWN:
         if ((state.owners & owners) != 0) return {Kind::OWN, state.owners & owners, state.since_ns};
         if ((state.owners & near) == 0 && !any_seam_ && look.tells_free && !(found && state.is_seen))
-          return {Kind::LEFT, state.owners, state.since_ns, -1, false, found || state.is_seen};
+          return {Kind::LEFT,
+                  state.owners,
+                  state.since_ns,
+                  -1,
+                  false,
+                  found || state.is_seen,
+                  state.kind == Kind::LEFT ? state.left_ns : look.stamp_ns};
         return {Kind::DOUBT, 0, state.since_ns};
       case Kind::OBSTACLE:
         return state;
@@ -312,7 +323,8 @@ class Model {
       const auto grows = [&](const State& state) {
         // One that appeared as own and is said to be in doubt grew, too.
         const bool turned = state.kind == Kind::OWN && state.since_ns == before_ns_ && !is_own;
-        return turned || (state.grew_ns > look.stamp_ns - 1000 * MS && state.grew_ns >= 0);
+        const StampNs since_ns = std::min(look.stamp_ns - 1000 * MS, before_last_ns_ - 1);
+        return turned || (state.grew_ns > since_ns && state.grew_ns >= 0);
       };
       const auto perhapsGrows = [&](const State& state) {
         return grows(state) && (state.kind != Kind::OBSTACLE || reached != Maybe::YES);

@@ -294,6 +294,13 @@ TEST(Advice, WhatWasGivenIsToBeCorrected) {
   EXPECT_EQ(adviceFor(StepStatus::VERTEX_COUNT, "1 points, but a polyline needs 2", ""), lost);
 }
 
+TEST(Advice, WhoHasNoClockIsToldOfIt) {
+  const std::string no_clock = "there is no stamp, and no /clock yet by which to tell the time of receipt";
+  EXPECT_EQ(adviceFor(StepStatus::DUPLICATE, no_clock, ""), "publish /clock first (rosbag play --clock)");
+  EXPECT_EQ(adviceFor(StepStatus::DUPLICATE, "the stamp is that of the last frame", ""),
+            "the publisher must stamp every frame anew");
+}
+
 /// Bytes as they go over the wire.
 template <class Message>
 std::string wireOf(const Message& message) {

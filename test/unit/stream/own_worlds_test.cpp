@@ -145,7 +145,7 @@ TEST_F(OwnWorlds, ATableFirstShownBesideALinkIsNobodysOnceThatIsAway) {
 }
 
 TEST_F(OwnWorlds, ADoubtThatAMapLeavesOutComesBackAsADoubt) {
-  const Place rests{{0.101, 0.051, 0.051}}, above{{0.101, 0.051, 0.2}};
+  const Place rests{{0.101, 0.051, 0.051}};
   go(rests, far_);
   map(rests.cells());
   EXPECT_EQ(doubted(go(rests, far_)), rests.cells().size());
@@ -282,6 +282,70 @@ TEST_F(OwnWorlds, AHandThatComesIsNeverTheirs) {
         }
         EXPECT_FALSE(isClear(bodies({{0.131, 0.051, 0.051}, 0.05}))) << speed << " m/s, " << step_ns << ' ' << body;
       }
+    }
+  }
+}
+
+// It comes while maps are missing, or they come less than once a second.
+TEST_F(OwnWorlds, AHandThatComesBetweenSeldomMapsIsNotTheCloths) {
+  const Place rests{{0.101, 0.051, 0.051}};
+  for (const auto& [pause_ms, from, speed] : {std::tuple{1600, 0.24, 0.0}, std::tuple{1100, 0.5, 0.1}}) {
+    start();
+    map({});
+    go(rests, far_);
+    map(rests.cells());
+    ASSERT_TRUE(isClear(go(rests, far_)));
+    for (double front = from; front > 0.221;) {
+      for (int k = 0; k < pause_ms / 100; ++k) go(rests, far_);
+      front = std::max(0.221, front - (speed > 0 ? speed * pause_ms * 1e-3 : 1));
+      map(rests.cells() + cellsOf({front, 0.06, 0.03}, {0.6, 0.14, 0.12}));
+    }
+    go(rests, far_);
+    EXPECT_FALSE(isClear(go({{0.131, 0.051, 0.051}}, far_))) << pause_ms;
+  }
+}
+
+// All of it is within the cloth's reach, for longer than what comes from outside is new.
+TEST_F(OwnWorlds, AThingThatSlidesBelowTheClothIsNotTheCloths) {
+  for (const double speed : {0.05, 0.1, 0.3}) {
+    start();
+    const Place rests{{0.101, 0.051, 0.061}};
+    const auto thingAt = [](double x) { return cellsOf({x, 0.061, 0.041}, {x + 0.04, 0.139, 0.059}); };
+    map({});
+    go(rests, far_);
+    map(rests.cells());
+    for (int k = 0; k < 6; ++k) {
+      go(rests, far_);
+      map(rests.cells());
+    }
+    for (double x = 0.4; x > 0.12; x -= speed * 0.1) {
+      go(rests, far_);
+      map(rests.cells() + thingAt(x));
+    }
+    go(rests, far_);
+    EXPECT_FALSE(isClear(go({{0.101, 0.051, 0.05}}, far_))) << speed;
+  }
+}
+
+// Something first appears beside a cloth, which then leaves it for a while in which nobody looks, or once.
+TEST_F(OwnWorlds, WhatAClothLeftForLongerThanAGapIsNotItsOwnAgain) {
+  const Cells cup = cellsOf({0.121, 0.071, 0.041}, {0.179, 0.13, 0.059});
+  const Place onto{{0.101, 0.051, 0.065}}, above{{0.101, 0.051, 0.2}}, into{{0.101, 0.051, 0.05}};
+  for (const int looks : {3, 8}) {
+    for (const bool is_found : {false, true}) {
+      start();
+      map({});
+      go(above, far_);
+      map(above.cells());
+      go(onto, far_);
+      map(onto.cells() + cup);
+      for (int k = 0; k < looks; ++k) {
+        go(above, far_);
+        map(above.cells() + cup, nullptr, is_found && k == 1);
+      }
+      go(onto, far_);
+      map(onto.cells() + cup, nullptr, false);
+      EXPECT_EQ(isClear(go(into, far_)), looks < 5) << looks << ' ' << is_found;
     }
   }
 }

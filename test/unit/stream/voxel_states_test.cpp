@@ -58,7 +58,7 @@ class OneVoxel {
   /// OCCUPIED: by a map that does not tell what was found.
   enum Shows { OCCUPIED, FOUND, UNFOUND, FREE, LEFT_OUT };
   /// A map, and the bodies until then: at its stamp they are where they are told to be.
-  void look(Shows shows, bool first, bool second, int pause_ms = 200) {
+  void look(Shows shows, bool first, bool second, int pause_ms = 100) {
     const StampNs from = now_;
     now_ += pause_ms * MS;
     move(0, from, first);
@@ -239,15 +239,15 @@ TEST(VoxelStates, EachCellHolds) {
 TEST(VoxelStates, WhatIsLeftOutIsFreeUntilABodyRestsThere) {
   for (const int looks : {1, 2, 3, 4, 5}) {
     OneVoxel world;
-    world.look(OneVoxel::LEFT_OUT, false, false);
-    for (int k = 0; k < looks; ++k) world.look(OneVoxel::LEFT_OUT, true, false);
-    world.look(OneVoxel::OCCUPIED, true, false);
+    world.look(OneVoxel::LEFT_OUT, false, false, 200);
+    for (int k = 0; k < looks; ++k) world.look(OneVoxel::LEFT_OUT, true, false, 200);
+    world.look(OneVoxel::OCCUPIED, true, false, 200);
     EXPECT_EQ(world.isOwn(), looks < 3) << looks;
     EXPECT_EQ(world.isDoubted(), looks >= 3) << looks;
   }
   OneVoxel first;  // what was there before the first map nobody knows
-  first.look(OneVoxel::LEFT_OUT, true, false);
-  first.look(OneVoxel::OCCUPIED, true, false);
+  first.look(OneVoxel::LEFT_OUT, true, false, 200);
+  first.look(OneVoxel::OCCUPIED, true, false, 200);
   EXPECT_TRUE(first.isDoubted());
 }
 
