@@ -18,7 +18,7 @@ namespace dccd {
 namespace test {
 namespace {
 
-constexpr double VOXEL_M = 0.1;
+constexpr double WANDERERS_VOXEL_M = 0.1;
 
 /// Some bodies of a few triangles that wander, perhaps a map, and a law and bounds with what is rare in them.
 class Wanderers {
@@ -92,12 +92,12 @@ class Wanderers {
   }
   void addMap() {
     std::vector<OccupiedLeaf> leaves;
-    const auto key = [](double x) { return static_cast<std::uint16_t>(32768 + std::floor(x / VOXEL_M)); };
+    const auto key = [](double x) { return static_cast<std::uint16_t>(32768 + std::floor(x / WANDERERS_VOXEL_M)); };
     for (int i = 0; i < 5; ++i) {
       const Vec3 at(1.2 * (i - 2) + uniform(-0.5, 0.5), uniform(-2, 2), uniform(-2, 2));
       leaves.push_back({{key(at.x()), key(at.y()), key(at.z())}, 1});
     }
-    step_.map.surface = VoxelSurface::build(VOXEL_M, std::move(leaves));
+    step_.map.surface = VoxelSurface::build(WANDERERS_VOXEL_M, std::move(leaves));
     if (isRare()) step_.map.map_from_fixed = Eigen::AngleAxisd(uniform(-3, 3), Vec3::UnitX());
   }
 
@@ -107,7 +107,7 @@ class Wanderers {
   std::vector<Expectation> expected_;
 };
 
-std::string told(const Outcome& outcome, const Wanderers& of) {
+std::string toldOf(const Outcome& outcome, const Wanderers& of) {
   std::ostringstream text;
   text << std::hexfloat;
   const SafeUntil until = safeUntil(outcome, of.bounds);
@@ -144,7 +144,7 @@ TEST(ReadDistances, TellTheSameAsAllOfThem) {
       ReadDistances readers(step, wanderers.bounds, wanderers.law);
       History::Impl::of(few).readers = &readers;
       const Outcome read = detect(step, options, few);
-      ASSERT_EQ(told(read, wanderers), told(whole, wanderers)) << "world " << world << ", step " << k;
+      ASSERT_EQ(toldOf(read, wanderers), toldOf(whole, wanderers)) << "world " << world << ", step " << k;
       ASSERT_EQ(read.clearances.size(), whole.clearances.size());
       for (std::size_t p = 0; p < whole.clearances.size(); ++p) {
         const ClearanceDistance &less = read.clearances[p].at_end, &more = whole.clearances[p].at_end;
