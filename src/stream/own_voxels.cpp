@@ -30,6 +30,7 @@ void OwnVoxelFinder::forget() {
   unseen_ = UnseenSpace();
   growth_.clear();
   entered_.clear();
+  entered_from_.clear();
   remembered_.clear();
   seen_.clear();
   seen_alone_.clear();
@@ -229,27 +230,43 @@ std::vector<Growth::Seed> OwnVoxelFinder::renewed(std::vector<Growth::Seed> grow
 }
 
 /// Which own voxels may hold more of what came from outside: those between a body and where it entered, if there it
-/// met voxels that were own before and so did not appear. from: what grew out of reach beside own voxels.
+/// met voxels that were own before and so did not appear; and as long as maps show what they were entered from.
+/// from: what grew out of reach beside own voxels.
 void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody>& bodies,
                                  std::vector<OccupiedLeaf> from) {
-  std::unordered_set<std::uint64_t> left;
+  std::unordered_set<std::uint64_t> left, were;
+  std::vector<OccupiedLeaf> earlier;
+  for (auto one = entered_from_.begin(); one != entered_from_.end();) {
+    const OccupiedLeaf leaf{unpacked(*one), 1};
+    const bool is_shown = coverage(look.change.now, leaf) == VoxelTree::Coverage::FULL;
+    if (is_shown) earlier.push_back(leaf);
+    one = is_shown ? std::next(one) : entered_from_.erase(one);
+  }
+  for (const OccupiedLeaf& leaf : from) entered_from_.insert(packed(leaf.min));
   for (const auto& [key, voxel] : stated_) {
     if (voxel.shown && voxel.state == VoxelState::OWN) left.insert(key);
     if (voxel.shown && voxel.state == VoxelState::DOUBT && voxel.grew) from.push_back({voxel.key, 1});
   }
-  double reach_m = 0;
-  for (const TrackedBody& body : bodies) reach_m = std::max(reach_m, body.reach_m);
+  for (const std::uint64_t key : entered_) {
+    if (left.count(key) > 0) were.insert(key);
+  }
+  double deepest_m = 0;
+  for (const TrackedBody& body : bodies) deepest_m = std::max(deepest_m, body.reach_m);
   const double resolution_m = look.map.surface->resolution();
   entered_.clear();
-  for (double deep_m = -resolution_m; deep_m < reach_m && !from.empty(); deep_m += resolution_m) {
-    std::vector<OccupiedLeaf> next;
-    const auto enter = [&](std::uint64_t key) {
-      if (left.erase(key) > 0 && entered_.insert(key).second) next.push_back({unpacked(key), 1});
-      return false;
-    };
-    for (const OccupiedLeaf& one : from) anyAround(one.min, enter);
-    from = std::move(next);
-  }
+  const auto flood = [&](std::vector<OccupiedLeaf> seeds, std::unordered_set<std::uint64_t>& own) {
+    for (double deep_m = -resolution_m; deep_m < deepest_m && !seeds.empty(); deep_m += resolution_m) {
+      std::vector<OccupiedLeaf> next;
+      const auto enter = [&](std::uint64_t key) {
+        if (own.erase(key) > 0 && entered_.insert(key).second) next.push_back({unpacked(key), 1});
+        return false;
+      };
+      for (const OccupiedLeaf& one : seeds) anyAround(one.min, enter);
+      seeds = std::move(next);
+    }
+  };
+  flood(std::move(from), left);
+  flood(std::move(earlier), were);
 }
 
 /// Which of what the map before left out is UNKNOWN: a body was within reach of it at that look, and already at the

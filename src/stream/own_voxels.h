@@ -1,7 +1,8 @@
 // Which voxels of a map a tracked body accounts for: the sensor that made the map saw the body there, not an obstacle.
 // The rule is the table of stream/voxel_states.h, voxel by voxel from one map to the next. Beside it:
-// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h). So is, in that map,
-//   what is own beside such a voxel, or one that came out of reach, a reach and a voxel deep: it may hold more of it.
+// - What appears within reach and touches what grew from outside is in doubt (stream/growth.h). So is what is own
+//   beside such a voxel, or one that came out of reach, a reach and a voxel deep, while maps show both: it may hold
+//   more.
 // - A voxel of a map that is trusted (octomap_file) is an obstacle.
 // - Where a body is gone, nothing is its own any more.
 // - A voxel in which the map's maker has seen something, but not often enough for an obstacle, is in doubt, unless a
@@ -109,9 +110,10 @@ class OwnVoxelFinder {
   std::deque<PastLook> past_;                                         // of the last OWN_GAP_S, and the one before these
   UnseenSpace unseen_;
   Growth growth_;
-  std::unordered_set<std::uint64_t> entered_;  // of the last map: OWN, packed, and in doubt for that map
-  std::vector<OccupiedLeaf> remembered_;       // obstacles that the last map did not show, nor showed as free
-  std::map<std::uint16_t, StampNs> first_;     // of each body, its first frame that is known of
+  std::unordered_set<std::uint64_t> entered_;       // of the last map: OWN, packed, and in doubt in it
+  std::unordered_set<std::uint64_t> entered_from_;  // of the last map: obstacles, packed, that came beside OWN
+  std::vector<OccupiedLeaf> remembered_;            // obstacles that the last map did not show, nor showed as free
+  std::map<std::uint16_t, StampNs> first_;          // of each body, its first frame that is known of
   std::map<std::uint16_t, std::shared_ptr<const MeshFrame>> last_frames_;  // of each, not after the last map
   std::set<std::uint16_t> known_;              // bodies whose way up to the last map was known
   RigidShapes shapes_;                         // of bodies that have been asked about

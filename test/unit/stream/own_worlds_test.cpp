@@ -388,6 +388,10 @@ TEST_F(OwnWorlds, AHandThatEntersOwnVoxelsIsNotTheCloths) {
       if (z > 0.11) EXPECT_TRUE(is_clear) << reach_m << ", from " << z;
       if (z < 0.05) EXPECT_FALSE(is_clear) << reach_m << ", from " << z;
     }
+    for (int k = 0; k < 15; ++k) {
+      map(seen + cellsOf({0.141, 0.091, 0.041}, {0.179, 0.129, 0.29}));
+      EXPECT_FALSE(isClear(go(rests, far_))) << reach_m << ", it stays, " << k;
+    }
     map(seen);
     EXPECT_TRUE(isClear(go(rests, far_))) << reach_m << ", gone";
   }
