@@ -160,7 +160,7 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
   const bool may_hide = !look.change.known && voxel.state == VoxelState::DOUBT && if_free != VoxelEvent::FREE_ALONE;
   const bool is_free = !voxel.shown && look.change.isFree(cube.leaf) && !may_hide;
   const bool was_left = voxel.state == VoxelState::LEFT || voxel.state == VoxelState::LEFT_SEEN;
-  const bool is_over = was_left && look.map.stamp_ns - voxel.left_ns > nanoseconds(tolerance::OWN_GAP_S);
+  const bool is_over = was_left && look.map.stamp_ns - voxel.left_ns > nanoseconds(tolerance::OWN_LEFT_S);
   const VoxelEvent if_occupied = is_over ? VoxelEvent::OCCUPIED_WITH_OTHER : look.occupied(cube, owners);
   voxel.state = nextState(voxel.state, is_free ? if_free : if_occupied);
   if (!was_left) voxel.left_ns = look.map.stamp_ns;

@@ -15,7 +15,7 @@ enum class VoxelState : std::uint8_t {
   OBSTACLE,   ///< it was occupied while nobody was within reach, or is trusted
   DOUBT,      ///< all else that is occupied
   LEFT,       ///< it was OWN, its owners are out of reach, and nothing was found there since: theirs if they come back
-              ///< within OWN_GAP_S, then in DOUBT
+              ///< within OWN_LEFT_S, then in DOUBT
   LEFT_SEEN,  ///< the same, but one look found something there: a sensor's noise, unless another one does
 };
 

@@ -328,10 +328,10 @@ TEST_F(OwnWorlds, AThingThatSlidesBelowTheClothIsNotTheCloths) {
 }
 
 // Something first appears beside a cloth, which then leaves it for a while in which nobody looks, or once.
-TEST_F(OwnWorlds, WhatAClothLeftForLongerThanAGapIsNotItsOwnAgain) {
+TEST_F(OwnWorlds, WhatAClothLeftForLongIsNotItsOwnAgain) {
   const Cells cup = cellsOf({0.121, 0.071, 0.041}, {0.179, 0.13, 0.059});
   const Place onto{{0.101, 0.051, 0.065}}, above{{0.101, 0.051, 0.2}}, into{{0.101, 0.051, 0.05}};
-  for (const int looks : {3, 8}) {
+  for (const int looks : {20, 35}) {
     for (const bool is_found : {false, true}) {
       start();
       map({});
@@ -345,7 +345,7 @@ TEST_F(OwnWorlds, WhatAClothLeftForLongerThanAGapIsNotItsOwnAgain) {
       }
       go(onto, far_);
       map(onto.cells() + cup, nullptr, false);
-      EXPECT_EQ(isClear(go(into, far_)), looks < 5) << looks << ' ' << is_found;
+      EXPECT_EQ(isClear(go(into, far_)), looks < 30) << looks << ' ' << is_found;
     }
   }
 }
