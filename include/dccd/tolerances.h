@@ -262,9 +262,9 @@ constexpr double OWN_GAP_S = 0.5;
 /// of 2 cm takes a hand of 0.1 m/s 0.2 s, and one of 10 cm a second. Larger: what a body's noise left beside it costs
 /// more proofs. Smaller: a slower hand may grow into a body's own.
 constexpr double OWN_GROWTH_S = 1;
-/// [s] What a body left, and nobody looked at again, is its own if it comes back within this. Larger: what was put there
-/// meanwhile is more easily taken for it. Smaller: an arm that goes to and fro meets its own doubt; in the real cell that
-/// costs one step in nine at half a second, none at three.
+/// [s] What a body left, and nobody looked at again, is its own if it comes back within this. Larger: what was put
+/// there meanwhile is more easily taken for it. Smaller: an arm that goes to and fro meets its own doubt; in the real
+/// cell that costs one step in nine at half a second, none at three.
 constexpr double OWN_LEFT_S = 3;
 /// [1] of a voxel: how far the map's frame may move before its voxels are other ones. Larger: a body's way is placed
 /// the less exactly among them. Smaller: a frame that trembles ends all that is own.
