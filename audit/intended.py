@@ -133,6 +133,8 @@ def paths(world, step, motions):
         in_tree = joints is not None and first.frame in joints.links and joints.moving(first.frame)
         with_it = lambda f: in_tree and f in joints.links and joints.moving(f)[-1:] == in_tree[-1:]
         frames = {n: f for n, f in frames.items() if f == first.frame or with_it(f)}
+        if not frames:
+            return
         at, parts, spent = tf.pose(first.frame, world.fixed, end), [], 0.0
         for motion, following in zip(motions, motions[1:] + [None]):
             if not motion.twist or motion.frame != first.frame:
@@ -159,6 +161,8 @@ def along_joints(world, step, motions, joints, frames):
     first, end, intent = motions[0], step.end, world.params['intent']
     leaders = lambda f: {joints.follows(j)[0] for j in joints.moving(f)}
     frames = {n: f for n, f in frames.items() if f in joints.links and leaders(f) <= set(first.message.joint_names)}
+    if not frames:
+        return
     try:
         base = world.transforms.pose(joints.root, world.fixed, end)
     except Unknown:

@@ -301,8 +301,8 @@ class CellTest(FolderTestCase):
 
     def test_along_a_trajectory(self):
         """Of joints, straight and by splines; where the robot is on it tf says."""
-        def swing(at, n):
-            message = JointTrajectory(joint_names=['elbow'])
+        def swing(at, n, joint='elbow'):
+            message = JointTrajectory(joint_names=[joint])
             message.header.stamp = at(1)
             for t in (0, .8):
                 message.points.append(JointTrajectoryPoint(positions=[.6 * t ** n], velocities=[.6 * n * t ** (n - 1)] * (n > 1),
@@ -319,6 +319,9 @@ class CellTest(FolderTestCase):
                       more=lambda at: [elbow(at, k, n) for k in range(11)] + [swing(at, n)])
             self.holds()
         self.on_the_path(5)
+        self.cell('nobody', self.INTENT + 'robot: %s/elbow.urdf\n' % self.folder,
+                  more=lambda at: [elbow(at, k, 1) for k in range(11)] + [swing(at, 1, 'nobody')])
+        self.refuted('along_path', lambda m: [setattr(m, 'used', True), m.bodies.append('elbow')], 'along_path', 'nobody said that they are to go')
 
     def test_what_is_carried(self):
         """The cloth leaves the finger no faster than is said, and both go their way."""
