@@ -133,8 +133,6 @@ def paths(world, step, motions):
         in_tree = joints is not None and first.frame in joints.links and joints.moving(first.frame)
         with_it = lambda f: in_tree and f in joints.links and joints.moving(f)[-1:] == in_tree[-1:]
         frames = {n: f for n, f in frames.items() if f == first.frame or with_it(f)}
-        if not frames:
-            return
         at, parts, spent = tf.pose(first.frame, world.fixed, end), [], 0.0
         for motion, following in zip(motions, motions[1:] + [None]):
             if not motion.twist or motion.frame != first.frame:
@@ -167,9 +165,8 @@ def along_joints(world, step, motions, joints, frames):
         base = world.transforms.pose(joints.root, world.fixed, end)
     except Unknown:
         return
-    base = np.eye(4) if base is None else base
+    base, now = np.eye(4) if base is None else base, (end - first.begin) / NS
     pose = lambda f, s: base @ joints.pose(f, first.positions(s))
-    now = (end - first.begin) / NS
     actual = {f: world.transforms.pose(f, world.fixed, end) for f in set(frames.values())}
     points = []
     for n, f in frames.items():
