@@ -448,6 +448,7 @@ class Map:
     number: int = 0
     problem: str = ''  # why it cannot be read
     rays: tuple = ((), ())  # of a cloud, where its sensor was, and the points
+    doubt: np.ndarray = ()  # of clouds, what may not be an obstacle yet: three points in turn make one of what was seen free for ever
     free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
 
     def without(self, part):
@@ -516,8 +517,11 @@ def octomap(data, binary, kind, resolution):
     return Map(resolution, *occupied, free=free)
 
 
-def picture_points(m, info):
-    """Pixels of a depth picture, as points of its optical frame; those without a depth are NaN."""
+def picture_points(m, infos):
+    """Pixels of a depth picture, as points of its optical frame; those without a depth are NaN. Where no info has its stamp, all say the same."""
+    infos = [info for info in infos if info.header.stamp == m.header.stamp][-1:] or infos
+    if len({info.P for info in infos}) != 1 or not (info := infos[0]).P[0] > 0 or (info.height, info.width) != (m.height, m.width):
+        raise Refused('no camera_info is of this picture')
     kind, metres = {'16UC1': ('u2', 0.001), 'mono16': ('u2', 0.001), '32FC1': ('f4', 1.0)}[m.encoding]
     depth = np.ndarray((m.height, m.width), ('>' if m.is_bigendian else '<') + kind, m.data, 0, (m.step, np.dtype(kind).itemsize))
     z = np.where(depth > 0, depth * metres, np.nan)

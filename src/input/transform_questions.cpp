@@ -218,7 +218,8 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
       const std::size_t found_before = stamps.size();
       const Frame *const parent = parentAt(frame, end_ns), *before = nullptr;
       StampNs since_ns = from_ns;
-      auto one = after(frame.sent, end_ns);
+      const auto next = after(frame.sent, end_ns);
+      auto one = next;
       const auto followsGap = [&](auto sample) {
         return sample != frame.sent.begin() &&
                (sample->second.gap || sample->first - std::prev(sample)->first > LONGEST_HOLE_NS);
@@ -234,8 +235,11 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
         if (since_ns < to_ns) stamps.push_back(since_ns);
       }
       if (has_gap) changes.push_back({end_ns, &frame.name, nullptr, nullptr});
+      const bool is_leaving = next != frame.sent.end() && next->second.parent != parent &&
+                              std::prev(next)->first < end_ns && end_ns == to_ns;
+      if (is_leaving) changes.push_back({next->first, &frame.name, &parent->name, &next->second.parent->name});
       const bool has_all = since_ns <= from_ns || (before == parent && !frame.is_cut);
-      if (has_all && !has_gap && stamps.size() == found_before) frame.none_between = question;
+      if (has_all && !has_gap && !is_leaving && stamps.size() == found_before) frame.none_between = question;
       if (has_all || since_ns <= last.stamp_ns) return;
       last = {since_ns, &frame.name, before == parent ? nullptr : &before->name, &parent->name};
     });

@@ -33,6 +33,11 @@ Knot unknownBefore(const TransformFeed::NewParent& change) {
                                             shortText(*change.now, MAX_NAME) + "' at " + secondsOf(change.stamp_ns));
 }
 
+/// A sample with the new parent is there.
+bool isKnownAt(StampNs stamp_ns, const TransformFeed::NewParent& change) {
+  return change.now && change.stamp_ns <= stamp_ns;
+}
+
 }  // namespace
 
 std::string secondsOf(StampNs stamp_ns) {
@@ -89,7 +94,9 @@ std::vector<Knot> TransformTracks::between(const std::string& target_name, const
     if (transforms_.lookup(target, source, 0, newest.pose, unused)) knots.push_back(std::move(newest));
   }
   for (const TransformFeed::NewParent& change : changes) {
-    if (from_ns < to_ns || !change.now) knots.push_back(unknownBefore(change));
+    if (from_ns == to_ns && isKnownAt(to_ns, change)) continue;
+    knots.push_back(unknownBefore(change));
+    knots.back().stamp_ns = std::min(knots.back().stamp_ns, to_ns);
   }
   const auto isBefore = [](const Knot& a, const Knot& b) { return a.stamp_ns < b.stamp_ns; };
   std::stable_sort(knots.begin(), knots.end(), isBefore);
@@ -100,9 +107,10 @@ std::string TransformTracks::doubtAt(const std::string& target, const std::strin
   if (target == source) return {};
   std::vector<TransformFeed::NewParent> changes;
   transforms_.stampsBetween(target, source, stamp_ns - 1, stamp_ns + 1, changes);
-  const auto unusable =
-      std::find_if(changes.begin(), changes.end(), [](const TransformFeed::NewParent& change) { return !change.now; });
-  return unusable == changes.end() ? std::string() : unknownBefore(*unusable).why_unknown;
+  const auto unknown = std::find_if(changes.begin(), changes.end(), [&](const TransformFeed::NewParent& change) {
+    return !isKnownAt(stamp_ns, change);
+  });
+  return unknown == changes.end() ? std::string() : unknownBefore(*unknown).why_unknown;
 }
 
 }  // namespace dccd

@@ -8,7 +8,7 @@ import rospy
 from deformable_ccd.msg import MeshStamped
 from geometry_msgs.msg import Point, Pose, PoseArray, TransformStamped, TwistStamped
 from octomap_msgs.msg import Octomap
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from shape_msgs.msg import MeshTriangle
 from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -48,6 +48,28 @@ def octree(keys, free=()):
                 write(node[i], level - 1)
     write(tree, 15)
     return [b - 256 if b > 127 else b for b in out]
+
+
+def full_octree(cubes, sure):
+    """The bytes of a full octree: of each cube's smallest key and level (0 is a finest voxel) whether it is occupied, with those log-odds. The first
+    of two that overlap counts."""
+    root = {}
+    for key, level, occupied in cubes:
+        node = root
+        for at in range(15, level - 1, -1):
+            child = sum((k >> at & 1) << i for i, k in enumerate(key))
+            if at == level:
+                node.setdefault(child, sure if occupied else -sure)
+            else:
+                node = node.setdefault(child, {})
+                if not isinstance(node, dict):
+                    break
+
+    def bytes_of(node):
+        if not isinstance(node, dict):
+            return struct.pack('<fB', node, 0)
+        return struct.pack('<fB', sure, sum(1 << i for i in node)) + b''.join(bytes_of(node[i]) for i in sorted(node))
+    return list(np.frombuffer(bytes_of(root), np.int8))
 
 
 class Way:
@@ -94,6 +116,7 @@ class World:
         self.options()
         self.camera(random.Random(-seed))  # of its own, so that worlds without a camera stay what they were
         self.rarely(random.Random(seed + NS))
+        self.otherwise(random.Random(seed + 3 * NS))
         self.rows.sort(key=lambda row: row[2])
         self.faults = []
         if not self.tame:
@@ -286,6 +309,84 @@ class World:
             p.setdefault('expected_contacts', []).append(row)
             p['phase'] = r.choice([row['phase'], ''])
 
+    def otherwise(self, r):
+        """The other forms: full maps with pruned leaves, maps of files, pictures, sensors that move or are two, a frame that changes its parent, a budget."""
+        p = self.params
+        if self.tame or r.random() < .5:
+            return
+        maps = [row for row in self.rows if row[0] == '/map']
+        if maps and r.random() < .7:
+            self.fully(r, maps)
+        elif maps and 'own_voxels_m' not in p:
+            self.filed(p, maps)
+        clouds = [row for row in self.rows if row[0] == '/points']
+        if clouds:
+            r.choice([self.pictured, self.pictured, self.carried_along, self.two])(r, clouds)
+        if len(self.chain) > 1 and r.random() < .3:
+            self.adopted(r)
+        if r.random() < .1:
+            p['step_budget_ms'] = r.choice([.01, .05, 100])
+
+    def fully(self, r, maps):
+        """The maps as full octrees, of voxels, and of cubes of 2 or 4 voxels an edge, of which some are known to be free."""
+        cubes = [((32768 + r.randrange(-16, 16, 1 << level), 32768 + r.randrange(-16, 16, 1 << level), 32768 + r.randrange(-16, 16, 1 << level)), level,
+                  r.random() < .4) for level in [r.choice([0, 1, 1, 2]) for _ in range(r.choice([5, 20]))]]
+        for row in maps:
+            cubes = [(key, level, occupied != (r.random() < .1)) for key, level, occupied in cubes if r.random() < .95]
+            row[1].binary, row[1].data = False, full_octree(cubes, r.choice([.85, 3.5]))
+
+    def filed(self, p, maps):
+        """The first of the maps as a file."""
+        self.rows = [row for row in self.rows if row[0] != '/map']
+        first = maps[0][1]
+        with open(self.folder + '/map.bt', 'wb') as out:
+            out.write(b'# Octomap OcTree binary file\nid OcTree\nsize 1\nres %r\ndata\n' % first.resolution + bytes(b & 255 for b in first.data))
+        del p['octomap_topic']
+        p.update(octomap_file=self.folder + '/map.bt', octomap_frame=first.header.frame_id)
+
+    def pictured(self, r, clouds):
+        """Depth pictures of a camera that looks down, in place of the clouds: a floor, and what stands on it; pixels without a depth, and stray ones."""
+        eye, height, width = copied(self.mount), 24, 32
+        eye.child_frame_id, eye.transform.translation.z = 'eye', .6
+        eye.transform.rotation.x, eye.transform.rotation.w = 1, 0
+        self.add('/tf_static', TFMessage([eye]), -.3)
+        self.rows = [row for row in self.rows if row[0] != '/points']
+        self.params.update(obstacle_cloud_topic='/depth/image', obstacle_max_range_m=2.)
+        metres, blocks = r.random() < .5, []
+        for k, (_, cloud, came, _) in enumerate(clouds):
+            blocks = [b for b in blocks if r.random() < .8] + [(r.randrange(20), r.randrange(28), r.randrange(1, 8), r.uniform(.3, .75))] * (r.random() < .5)
+            depth = np.full((height, width), .8)
+            for v, u, size, z in blocks:
+                depth[v:v + size, u:u + size] = z
+            for _ in range(r.choice([0, 3])):
+                depth[r.randrange(height), r.randrange(width)] = r.choice([0, 0, r.uniform(.3, .8)])
+            data = depth.astype('<f4') if metres else np.round(depth * 1000).astype('<u2')
+            picture = Image(height=height, width=width, encoding='32FC1' if metres else '16UC1', step=data.strides[0], data=data.tobytes())
+            picture.header.frame_id, picture.header.stamp = 'eye', cloud.header.stamp
+            info = CameraInfo(header=picture.header, height=height, width=width, distortion_model='plumb_bob', D=[0] * 5,
+                              K=[30, 0, 15.5, 0, 30, 11.5, 0, 0, 1], R=[1, 0, 0, 0, 1, 0, 0, 0, 1], P=[30, 0, 15.5, 0, 0, 30, 11.5, 0, 0, 0, 1, 0])
+            for topic, message in (('/depth/camera_info', info), ('/depth/image', picture)):
+                self.rows.append([topic, message, came, topic])
+
+    def carried_along(self, r, clouds):
+        """The sensor goes with a joint."""
+        self.params['octomap_frame'] = r.choice(['world', 'mount'])
+        for row in clouds:
+            row[1].header.frame_id = self.chain[0]
+
+    def two(self, r, clouds):
+        """Every second cloud comes from another sensor."""
+        del self.params['obstacle_cloud_topic']
+        self.params['obstacle_cloud_topics'] = ['/points', {'topic': '/others', 'sensor_frame': r.choice(['mount', self.chain[0]])}]
+        for row in clouds[::2]:
+            row[0] = row[3] = '/others'
+
+    def adopted(self, r):
+        """From some moment on the last joint is told in the world."""
+        mine = [row for row in self.rows if row[0] == '/tf' and row[1].transforms[0].child_frame_id == self.chain[-1]]
+        for row in mine[r.randrange(len(mine)):]:
+            row[1].transforms[0].header.frame_id = 'world'
+
     def ahead(self, r):
         """Limits, what the finger carries, and twists by which it is said to go: some right, some late, some of a frame that is not there; or of a robot."""
         p = self.params
@@ -401,12 +502,16 @@ def restamped(message, by):
 def moved(message, by, r):
     if isinstance(message, TFMessage):
         message.transforms[0].transform.translation.z += by
+    elif isinstance(message, Image):
+        message.data = message.data[64:] + message.data[:64]
+    elif isinstance(message, CameraInfo):
+        message.P = [value + by for value in message.P]
     elif isinstance(message, PointCloud2):
         values = np.frombuffer(message.data, '<f4').copy()
         values[2::3] += by
         message.data = values.tobytes()
     elif isinstance(message, Octomap):
-        message.data = octree({tuple(32768 + r.randrange(-6, 7) for _ in range(3)) for _ in range(4)})
+        message.binary, message.data = True, octree({tuple(32768 + r.randrange(-6, 7) for _ in range(3)) for _ in range(4)})
     else:
         for p in getattr(message, 'vertices', None) or getattr(message, 'points', None) or [x.position for x in message.poses]:
             p.z += by
@@ -420,6 +525,10 @@ def damaged(message, r):
         message.data = message.data[:-5] if r.random() < .5 else struct.pack('<f', nan) + message.data[4:]
     elif isinstance(message, Octomap):
         message.data = message.data[:r.randrange(1, 20)]
+    elif isinstance(message, Image):
+        message.step, message.width = r.choice([(3, 32), (0, 0), (128, 31)])
+    elif isinstance(message, CameraInfo):
+        message.P = [r.choice([nan, 0.0])] * 12
     elif isinstance(message, MeshStamped) and r.random() < .5:
         message.triangles[0].vertex_indices = (0, 1, 999)
     else:

@@ -165,6 +165,29 @@ TEST(RigidBodies, WhoseFrameHasAnotherParentWithinAStepHaveNoPlaceInIt) {
   }
 }
 
+// The cloth's frame comes after the arm last had the tip, and before the stand has it: the arm may have dipped meanwhile.
+TEST(RigidBodies, HaveNoPlaceBetweenTwoParents) {
+  for (const double at_s : {0.1, 0.11, 0.12}) {
+    Moving scene(clothAndTip());
+    for (int i = 0; i <= 8; ++i) {
+      for (const char* frame : {"arm", "stand"}) scene.move(frame, 0.02 * i, 0.5);
+      geometry_msgs::TransformStamped tip = above("tip", 0, after(0.02 * i));
+      tip.header.frame_id = i <= 5 ? "arm" : "stand";
+      scene.tell({tip});
+    }
+    scene.offer(0.05, 0);
+    scene.offer(at_s, 0);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), at_s == 0.1) << scene.outcome.reason;
+    if (at_s > 0.1) {
+      EXPECT_NE(scene.outcome.reason.find("changed its parent from 'arm' to 'stand' at 1700000000.120000000 s"),
+                std::string::npos)
+          << scene.outcome.reason;
+    }
+    scene.offer(0.15, 0);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), at_s == 0.12) << "between the two it may have been anywhere";
+  }
+}
+
 // As in a bag, where all of tf is there: the arm that has the tip dips within a step that is long over when the tip is
 // laid down.
 TEST(RigidBodies, AreLookedAtByWhatCarriedThemThen) {
