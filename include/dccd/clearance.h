@@ -37,7 +37,7 @@ enum class ClearanceStatus : std::uint8_t {
 DCCD_EXPORT const char* toString(ClearanceStatus status);
 
 /// The distance of two partners [m], unsigned: what is inside of a closed body has a distance from its surface.
-/// lower_m <= truth <= upper_m for every finite input.
+/// lower_m <= truth <= upper_m for every finite input. From the map: from Outcome::measured.
 struct ClearanceDistance {
   ClearanceStatus status = ClearanceStatus::UNKNOWN;
   double lower_m = 0;

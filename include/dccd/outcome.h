@@ -299,6 +299,8 @@ struct Outcome : Findings {
 
   std::shared_ptr<const Step> step;              ///< what it answers; null where nothing was answered
   std::shared_ptr<const VoxelSurface> obstacle;  ///< of the step's map, what exclude_boxes left; null: none
+  /// What distances from the map are taken to: `obstacle` with OwnVoxels::seen. Null: no distances, or no map.
+  std::shared_ptr<const VoxelSurface> measured;
 
   /// Why it is not proved, a sentence each.
   std::vector<std::string> missing() const { return step ? claim.missing(step->bodies) : claim.missing({}); }

@@ -29,6 +29,8 @@ struct OwnVoxels {
   // Not recorded.
   std::shared_ptr<const std::vector<OwnVoxel>> voxels{};  ///< for display; null: none
   std::shared_ptr<const VoxelSurface> doubted_surface{};  ///< of those in doubt; null: there are none
+  /// Of these what a sensor saw, with no body near, but not often enough for an obstacle: distances are taken to it, too.
+  std::shared_ptr<const std::vector<OccupiedLeaf>> seen{};  ///< null: none
 };
 
 /// The map of a step. None: surface null. Valid and empty: a surface without leaves.

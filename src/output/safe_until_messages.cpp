@@ -49,8 +49,9 @@ std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<S
   sentences.push_back(outcome.obstacle
                           ? "all that can be touched is in the map, which stands still and gets no new voxel"
                           : "nothing was checked against a map");
-  const std::uint64_t doubted = outcome.step->map.own.doubted;
-  if (doubted > 0) sentences.push_back("voxels of the map in doubt are no obstacle: " + std::to_string(doubted));
+  const OwnVoxels& own = outcome.step->map.own;
+  const std::uint64_t seen = own.seen ? own.seen->size() : 0, doubted = own.doubted - std::min(own.doubted, seen);
+  if (doubted > 0) sentences.push_back("voxels near bodies that are in doubt are no obstacle: " + std::to_string(doubted));
   for (const Body& body : bodies) {
     if (!meetsItself(body)) continue;
     sentences.push_back(asksItself(outcome)

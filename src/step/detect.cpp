@@ -96,6 +96,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (options.clearance.wanted) clearance->finish(parts, outcome);
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = prepared.map.surface;
+  outcome.measured = prepared.map.measured;
   const std::size_t hits = outcome.contacts.size();
   prepared.expected.mark(outcome);
   if (options.patches) findPatches(outcome);
@@ -141,7 +142,7 @@ void History::Impl::findPatches(Outcome& outcome) {
 void History::Impl::findClearance(const Part& part, Findings& result) {
   const Clock::time_point start = Clock::now();
   clearance->addPart(
-      {part.step, part.index, part.count, part.scene, prepared.map.surface, result, part.shareFrom(start)});
+      {part.step, part.index, part.count, part.scene, prepared.map.measured, result, part.shareFrom(start)});
   result.stats[Effect::CLEARANCE].ms = msSince(start);
 }
 

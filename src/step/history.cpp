@@ -73,7 +73,7 @@ void History::Impl::prepare(const Step& step, const Options& wanted) {
   setBodies(step);
   if (!prepared.expected_known) prepared.expected.set(wanted.expected, step.bodies);
   prepared.expected_known = true;
-  prepared.map.set(step.map, wanted.exclude_boxes);
+  prepared.map.set(step.map, wanted.exclude_boxes, wanted.clearance.wanted);
   if (!wanted.clearance.wanted) return;
   if (!clearance) clearance = std::make_unique<ClearanceFinder>();
   clearance->begin(step, scene, wanted, readers);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/next_surface.h"
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
 #include "proof/looked.h"
@@ -82,14 +83,27 @@ const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Posit
   return moved;
 }
 
+/// The reduced map, and what was seen there too seldom for an obstacle.
+std::shared_ptr<const VoxelSurface> withSeen(const ObstacleMap& map, const std::vector<Box>& exclude_boxes,
+                                             const std::shared_ptr<const VoxelSurface>& reduced) {
+  if (!reduced || !map.own.seen) return reduced;
+  const double resolution_m = reduced->resolution();
+  std::vector<OccupiedLeaf> leaves = reduced->leaves();
+  const std::vector<OccupiedLeaf> seen =
+      leavesOutside(*map.own.seen, resolution_m, map.map_from_fixed.inverse(), exclude_boxes).leaves;
+  leaves.insert(leaves.end(), seen.begin(), seen.end());
+  return nextSurface(resolution_m, std::move(leaves), *reduced);
+}
+
 void ReducedMap::clear() noexcept {
-  given_ = surface = nullptr;
+  given_ = surface = measured = nullptr;
   excluded_voxels = 0;
 }
 
-void ReducedMap::set(const ObstacleMap& map, const std::vector<Box>& exclude_boxes) {
+void ReducedMap::set(const ObstacleMap& map, const std::vector<Box>& exclude_boxes, bool is_measured) {
   const bool same_pose = pose_.matrix() == map.map_from_fixed.matrix();
-  if (given_ == map.surface && (same_pose || exclude_boxes.empty())) return;
+  const bool has_measured = !is_measured || (measured && seen_ == map.own.seen) || !map.surface;
+  if (given_ == map.surface && has_measured && (same_pose || exclude_boxes.empty())) return;
   clear();
   std::shared_ptr<const VoxelSurface> reduced = map.surface;
   if (map.surface && !exclude_boxes.empty()) {
@@ -100,8 +114,10 @@ void ReducedMap::set(const ObstacleMap& map, const std::vector<Box>& exclude_box
     }
     excluded_voxels = remaining.excluded_voxels;
   }
+  if (is_measured) measured = withSeen(map, exclude_boxes, reduced);
   surface = std::move(reduced);
   given_ = map.surface;
+  seen_ = map.own.seen;
   pose_ = map.map_from_fixed;
 }
 

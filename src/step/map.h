@@ -18,15 +18,17 @@ const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Posit
 
 /// A step's map without what exclude_boxes leave out.
 struct ReducedMap {
-  std::shared_ptr<const VoxelSurface> surface;  ///< null: there is none
+  std::shared_ptr<const VoxelSurface> surface;   ///< null: there is none
+  std::shared_ptr<const VoxelSurface> measured;  ///< with OwnVoxels::seen, where distances are wanted
   std::uint64_t excluded_voxels = 0;
 
   /// Made anew where it is another map, or where it lies elsewhere under the boxes, which are the same until clear().
-  void set(const ObstacleMap& map, const std::vector<Box>& exclude_boxes);
+  void set(const ObstacleMap& map, const std::vector<Box>& exclude_boxes, bool is_measured);
   void clear() noexcept;
 
  private:
   std::shared_ptr<const VoxelSurface> given_;
+  std::shared_ptr<const std::vector<OccupiedLeaf>> seen_;
   Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
 };
 

@@ -189,7 +189,7 @@ ApproachLimits ApproachSearch::run(const Outcome& outcome, const Options& option
   if (!shapes_) shapes_ = std::make_shared<Shapes>();
   shapes_->bodies.resize(bodies.size());
   for (Shapes::One& one : shapes_->bodies) one.is_known = false;
-  if (outcome.obstacle) shapes_->map.set(outcome.obstacle);
+  if (outcome.measured) shapes_->map.set(outcome.measured);
   const auto isLink = [&](std::uint16_t b) { return b != OBSTACLE_BODY && bodies[b].rigid && bounds[b].max_m_s > 0; };
   for (std::uint16_t b = 0; b < bodies.size(); ++b)
     if (isLink(b)) result.bodies.push_back(b);

@@ -82,6 +82,7 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
     if (voxel.doubted) doubted.push_back({voxel.key, 1});
   }
   map.own.doubted_surface = doubted.empty() ? nullptr : VoxelSurface::build(resolution_m, std::move(doubted));
+  map.own.seen = seen_.empty() ? nullptr : share(seen_);
   map.own.voxels = share(std::move(voxels));
   describe(bodies, trust_first, map.known != nullptr, gap_, map.own);
   if (!without.empty()) {

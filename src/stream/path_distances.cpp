@@ -47,7 +47,7 @@ void PathDistances::begin(const Outcome& outcome, const IntendedPath& path, cons
   questions_ = 0;
   shapes_.resize(outcome.step->bodies.size());
   for (Shape& shape : shapes_) shape.is_known = false;
-  if (outcome.obstacle) map_.set(outcome.obstacle);
+  if (outcome.measured) map_.set(outcome.measured);
 }
 
 std::size_t PathDistances::lastPieceOf(const Stretch& stretch) const {
@@ -201,9 +201,9 @@ double PathDistances::place(const Way& way, const Stretch& stretch) {
 double PathDistances::over(Way& way, const Stretch& stretch, double enough_m, double tolerance_m, bool only_whether) {
   const bool with_map = way.still == OBSTACLE_BODY;
   found_ = {};
-  if (with_map && outcome_->obstacle && outcome_->obstacle->leafCount() == 0) return SpeedBound::NONE;
+  if (with_map && outcome_->measured && outcome_->measured->leafCount() == 0) return SpeedBound::NONE;
   const FeatureTree& tree = shapes_[way.mover].moving;
-  const bool known = with_map ? outcome_->obstacle != nullptr : !shapes_[way.still].still.empty();
+  const bool known = with_map ? outcome_->measured != nullptr : !shapes_[way.still].still.empty();
   if (!known || tree.empty() || !std::isfinite(way.rounding_m)) return 0;
   ++questions_;
   const double taken_m =

@@ -8,6 +8,7 @@ import rospy
 from deformable_ccd.msg import MeshStamped
 from geometry_msgs.msg import Point, Pose, PoseArray, TransformStamped, TwistStamped
 from octomap_msgs.msg import Octomap
+from pcl_msgs.msg import PolygonMesh, Vertices
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from shape_msgs.msg import MeshTriangle
 from tf2_msgs.msg import TFMessage
@@ -319,6 +320,8 @@ class World:
             self.fully(r, maps)
         elif maps and 'own_voxels_m' not in p:
             self.filed(p, maps)
+        if not maps and 'own_voxels_m' not in p:
+            self.camera(r)
         clouds = [row for row in self.rows if row[0] == '/points']
         if clouds:
             r.choice([self.pictured, self.pictured, self.carried_along, self.two])(r, clouds)
@@ -326,6 +329,35 @@ class World:
             self.adopted(r)
         if r.random() < .1:
             p['step_budget_ms'] = r.choice([.01, .05, 100])
+        if r.random() < .1:
+            p.update(r.choice([{'max_contacts': r.choice([1, 5])}, {'max_vertex_step_m': r.choice([.01, .05])}, {'effects': {'self_collision': 'off'}}]))
+        if maps and 'own_voxels_m' not in p and r.random() < .3:
+            p.update(unknown_space='occupied', unknown_box=[-.3, -.3, r.uniform(-.3, .1), .3, .3, .3])
+        if clouds and r.random() < .3:
+            p.update(r.choice([{'obstacle_min_range_m': .1}, {'obstacle_no_return': 'clears'}, {'obstacle_box': [-.1, -.1, -.1, .1, .1, .3]}]))
+        for name in p['bodies']:
+            if r.random() < .5:
+                self.formed(r, name, [row for row in self.rows if row[0] == '/' + name])
+
+    def formed(self, r, name, mine):
+        """The body's messages in another form of the same: padded clouds of doubles in rows, markers with a pose, lists of segments, polygons."""
+        topology = self.params['bodies'][name].get('topology')
+        for row in mine:
+            message = row[1]
+            if isinstance(message, PointCloud2):
+                padded(message, topology['rows'])
+            elif isinstance(message, PoseArray):
+                row[1] = Marker(header=message.header, type=Marker.LINE_LIST)
+                row[1].points = [p.position for pair in zip(message.poses, message.poses[1:]) for p in pair]
+                row[1].pose.orientation.w = row[1].scale.x = 1
+            elif isinstance(message, Marker) and message.type == Marker.TRIANGLE_LIST:  # half a turn about z, and up
+                message.pose.position.z, message.pose.orientation.z, message.pose.orientation.w = .01, 1, 0
+            elif isinstance(message, MeshStamped):
+                row[1] = PolygonMesh(header=message.header, polygons=[Vertices(list(t.vertex_indices)) for t in message.triangles])
+                row[1].cloud = self.cloud([(p.x, p.y, p.z) for p in message.vertices], 1, 0, '')
+                row[1].cloud.header = message.header
+        if topology and mine and r.random() < .5:  # the rows say it
+            del self.params['bodies'][name]['topology']
 
     def fully(self, r, maps):
         """The maps as full octrees, of voxels, and of cubes of 2 or 4 voxels an edge, of which some are known to be free."""
@@ -477,6 +509,16 @@ class World:
             row[1] = damaged(copied(row[1]), r)
 
 
+def padded(cloud, rows):
+    """As an organised cloud of doubles, big-endian, with a gap after each point and each row."""
+    points = np.frombuffer(cloud.data, '<f4').reshape(rows, -1, 3)
+    cloud.height, cloud.width = points.shape[:2]
+    cloud.point_step, cloud.row_step, cloud.is_bigendian = 40, 40 * points.shape[1] + 16, True
+    for field in cloud.fields:
+        field.offset, field.datatype = 2 * field.offset + 8, PointField.FLOAT64
+    cloud.data = b''.join(b''.join(struct.pack('>8x3d8x', *p) for p in row) + bytes(16) for row in points.tolist())
+
+
 def seen_from(cloud, place):
     cloud.fields += [PointField(name='vp_' + n, offset=12 + 4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate('xyz')]
     cloud.data = b''.join(cloud.data[i:i + 12] + struct.pack('<3f', *place) for i in range(0, len(cloud.data), 12))
@@ -507,9 +549,14 @@ def moved(message, by, r):
     elif isinstance(message, CameraInfo):
         message.P = [value + by for value in message.P]
     elif isinstance(message, PointCloud2):
-        values = np.frombuffer(message.data, '<f4').copy()
-        values[2::3] += by
-        message.data = values.tobytes()
+        step, (kind, at) = message.point_step, ('>d', 24) if message.is_bigendian else ('<f', message.fields[2].offset)
+        data = bytearray(message.data)
+        for begin in range(0, len(data), message.row_step):
+            for place in range(begin + at, begin + at + message.width * step, step):
+                struct.pack_into(kind, data, place, struct.unpack_from(kind, data, place)[0] + by)
+        message.data = bytes(data)
+    elif isinstance(message, PolygonMesh):
+        moved(message.cloud, by, r)
     elif isinstance(message, Octomap):
         message.binary, message.data = True, octree({tuple(32768 + r.randrange(-6, 7) for _ in range(3)) for _ in range(4)})
     else:
@@ -529,6 +576,8 @@ def damaged(message, r):
         message.step, message.width = r.choice([(3, 32), (0, 0), (128, 31)])
     elif isinstance(message, CameraInfo):
         message.P = [r.choice([nan, 0.0])] * 12
+    elif isinstance(message, PolygonMesh):
+        message.polygons[0].vertices[1] = 999
     elif isinstance(message, MeshStamped) and r.random() < .5:
         message.triangles[0].vertex_indices = (0, 1, 999)
     else:

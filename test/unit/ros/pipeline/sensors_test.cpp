@@ -573,6 +573,30 @@ TEST(Sensors, AStepThatTouchesWhatWasSeenTooSeldomIsNotProved) {
   EXPECT_FALSE(camera.feed(1.5, 0.35f).contacts.empty()) << "it was seen again";
 }
 
+// What moves in front of a camera is seen in each voxel once or twice: it was near to nothing until a step touched it.
+TEST(Sensors, DistancesAreTakenToWhatWasSeenTooSeldom) {
+  for (const bool is_there : {false, true}) {
+    for (const bool is_excluded : {false, true}) {
+      Camera camera(std::string("effects: {clearance: 'on'}, clearance: {max_m: 2.0}") +
+                    (is_excluded ? ", exclude_boxes: [[-1.0, -1.0, 0.2, 1.0, 1.0, 0.45]]" : ""));
+      for (int i = 0; i < 4; ++i) camera.give(camera.add(tableAnd(false, 1)));
+      camera.feed(1, 0.6f);
+      camera.feed(1.1, 0.6f);
+      camera.give(camera.add(tableAnd(is_there, 1.1)));
+      const Outcome& outcome = camera.feed(1.2, 0.6f);
+      EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
+      ASSERT_EQ(outcome.clearances.size(), 1u);
+      const ClearanceDistance& distance = outcome.clearances[0].over_step;
+      const double truth_m = is_there && !is_excluded ? 0.2 : 0.5;  // to the tops of its voxel and of the table's
+      EXPECT_EQ(distance.status, ClearanceStatus::MEASURED);
+      EXPECT_NEAR(distance.upper_m, truth_m, 1e-3) << is_there << is_excluded;
+      EXPECT_LE(distance.lower_m, distance.upper_m);
+      camera.give(camera.add(tableAnd(false, 1.2)));
+      EXPECT_NEAR(camera.feed(1.3, 0.6f).clearances[0].over_step.lower_m, 0.5, 1e-3) << "it went away";
+    }
+  }
+}
+
 TEST(Sensors, WhatIsSeenOfABodyIsNotInDoubt) {
   for (const bool is_near : {true, false}) {
     Camera camera("own_voxels_m: auto");
