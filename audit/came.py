@@ -448,6 +448,7 @@ class Map:
     number: int = 0
     problem: str = ''  # why it cannot be read
     rays: tuple = ((), ())  # of a cloud, where its sensor was, and the points
+    doubt: tuple = ()  # of clouds, what may not be an obstacle yet: three points in turn make one of what was seen free for ever
     free: tuple = (NO_KEYS, np.empty(0, int))  # leaves that are known to be free, as the two above
 
     def without(self, part):

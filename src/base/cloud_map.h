@@ -74,6 +74,8 @@ class DCCD_EXPORT CloudMap {
   /// Voxels in Morton order in which a point lay that were not occupied with it, and which nothing has looked through
   /// since.
   const std::vector<OccupiedLeaf>& doubtful() const;
+  /// Of these, the ones in which a point of the newest cloud lies.
+  std::vector<OccupiedLeaf> doubtfulNow() const;
   /// The data of its Octomap message: OctoMap's binary stream, or the full one with log-odds.
   std::vector<std::int8_t> serialized(bool binary) const;
   /// [bytes] At most.

@@ -346,6 +346,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
     const std::vector<OccupiedLeaf>& doubtful = map_->doubtful();
     if (!doubtful.empty()) {
       map.own.doubted_surface = memory_.counted(VoxelSurface::build(config_.cloud_map.resolution_m, doubtful));
+      map.own.seen = share(map_->doubtfulNow());
     }
     return map_->leaves(limits);
   });

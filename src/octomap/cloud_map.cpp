@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 
@@ -95,6 +96,15 @@ CloudMap::~CloudMap() = default;
 std::size_t CloudMap::memoryBytes() const { return impl_->tree.size() * NODE_BYTES + impl_->reader.memoryBytes(); }
 
 const std::vector<OccupiedLeaf>& CloudMap::doubtful() const { return impl_->leaves.doubtful; }
+
+std::vector<OccupiedLeaf> CloudMap::doubtfulNow() const {
+  const std::vector<OccupiedLeaf>&doubtful = impl_->leaves.doubtful, &found = impl_->leaves.found;
+  std::vector<OccupiedLeaf> now;
+  const auto isBefore = [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return codeOf(a) < codeOf(b); };
+  std::set_intersection(doubtful.begin(), doubtful.end(), found.begin(), found.end(), std::back_inserter(now),
+                        isBefore);
+  return now;
+}
 
 std::vector<std::int8_t> CloudMap::serialized(bool binary) const { return dccd::serialized(impl_->tree, binary); }
 

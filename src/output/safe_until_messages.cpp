@@ -51,7 +51,7 @@ std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<S
                           : "nothing was checked against a map");
   const OwnVoxels& own = outcome.step->map.own;
   const std::uint64_t seen = own.seen ? own.seen->size() : 0, doubted = own.doubted - std::min(own.doubted, seen);
-  if (doubted > 0) sentences.push_back("voxels near bodies that are in doubt are no obstacle: " + std::to_string(doubted));
+  if (doubted > 0) sentences.push_back("voxels of the map in doubt are no obstacle: " + std::to_string(doubted));
   for (const Body& body : bodies) {
     if (!meetsItself(body)) continue;
     sentences.push_back(asksItself(outcome)

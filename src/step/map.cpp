@@ -7,6 +7,8 @@
 #include "base/next_surface.h"
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
+#include "obstacle/leaf_sets.h"
+#include "obstacle/voxel_surface_impl.h"
 #include "proof/looked.h"
 #include "step/conclude.h"
 #include "step/history.h"
@@ -72,6 +74,20 @@ void keepAnswer(std::size_t b, const Part& part, const std::vector<Contact>& con
               pairs};
 }
 
+/// The reduced map, and what was seen there too seldom for an obstacle.
+std::shared_ptr<const VoxelSurface> withSeen(const ObstacleMap& map, const std::vector<Box>& exclude_boxes,
+                                             const std::shared_ptr<const VoxelSurface>& reduced) {
+  if (!reduced || !map.own.seen) return reduced;
+  const double resolution_m = reduced->resolution();
+  std::vector<OccupiedLeaf> leaves = reduced->leaves();
+  const auto add = [&](const OccupiedLeaf& leaf) { leaves.push_back(leaf); };
+  const RemainingLeaves seen =
+      leavesOutside(*map.own.seen, resolution_m, map.map_from_fixed.inverse(), exclude_boxes);
+  for (const OccupiedLeaf& leaf : seen.leaves)
+    visitUncovered(VoxelSurface::Impl::of(*reduced).tree, leaf, add);
+  return nextSurface(resolution_m, std::move(leaves), *reduced);
+}
+
 }  // namespace
 
 const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved) {
@@ -81,18 +97,6 @@ const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Posit
   const Vec3 translation = map_from_fixed.translation();
   for (std::size_t i = 0; i < fixed.size(); ++i) moved[i] = rotation * fixed[i] + translation;
   return moved;
-}
-
-/// The reduced map, and what was seen there too seldom for an obstacle.
-std::shared_ptr<const VoxelSurface> withSeen(const ObstacleMap& map, const std::vector<Box>& exclude_boxes,
-                                             const std::shared_ptr<const VoxelSurface>& reduced) {
-  if (!reduced || !map.own.seen) return reduced;
-  const double resolution_m = reduced->resolution();
-  std::vector<OccupiedLeaf> leaves = reduced->leaves();
-  const std::vector<OccupiedLeaf> seen =
-      leavesOutside(*map.own.seen, resolution_m, map.map_from_fixed.inverse(), exclude_boxes).leaves;
-  leaves.insert(leaves.end(), seen.begin(), seen.end());
-  return nextSurface(resolution_m, std::move(leaves), *reduced);
 }
 
 void ReducedMap::clear() noexcept {

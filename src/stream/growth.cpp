@@ -5,6 +5,18 @@
 
 namespace dccd {
 
+bool isOfGroup(const VoxelKey& voxel, const std::unordered_set<std::uint64_t>& voxels) {
+  std::vector<std::uint64_t> group{packed(voxel)};
+  for (std::size_t i = 0; i < group.size() && group.size() < Growth::GROUP; ++i) {
+    anyAround(unpacked(group[i]), [&](std::uint64_t key) {
+      const bool is_new = voxels.count(key) > 0 && std::find(group.begin(), group.end(), key) == group.end();
+      if (is_new) group.push_back(key);
+      return group.size() >= Growth::GROUP;
+    });
+  }
+  return group.size() >= Growth::GROUP;
+}
+
 void Growth::add(const OccupiedLeaf& cube, bool is_doubted, StampNs free_ns, StampNs now_ns) {
   if (grown_.size() < MOST) return grown_.push_back({cube, is_doubted, free_ns, now_ns});
   too_many_ns_ = std::max(too_many_ns_, free_ns);
@@ -24,18 +36,6 @@ void Growth::keep(const VoxelTree& now, const VoxelTree& before, StampNs since_n
   }
 }
 
-bool Growth::isGroup(const VoxelKey& voxel) const {
-  std::vector<std::uint64_t> group{packed(voxel)};
-  for (std::size_t i = 0; i < group.size() && group.size() < GROUP; ++i) {
-    anyAround(unpacked(group[i]), [&](std::uint64_t key) {
-      const bool is_new = voxels_.count(key) > 0 && std::find(group.begin(), group.end(), key) == group.end();
-      if (is_new) group.push_back(key);
-      return group.size() >= GROUP;
-    });
-  }
-  return group.size() >= GROUP;
-}
-
 std::vector<Growth::Seed> Growth::beside(const std::vector<std::uint64_t>& keys, bool is_doubted) const {
   std::vector<Seed> found;
   if (keys.empty() || grown_.empty()) return found;
@@ -46,7 +46,7 @@ std::vector<Growth::Seed> Growth::beside(const std::vector<std::uint64_t>& keys,
     if (one.is_doubted != is_doubted) continue;
     auto take = [&](const OccupiedLeaf& voxel) {
       const bool touches = anyAround(voxel.min, [&](std::uint64_t key) { return all.count(key) > 0; });
-      if (touches && (one.cube.size > 1 || isGroup(voxel.min))) found.push_back({voxel, one.free_ns});
+      if (touches && (one.cube.size > 1 || isOfGroup(voxel.min, voxels_))) found.push_back({voxel, one.free_ns});
     };
     visitVoxels(one.cube, near, take);
   }

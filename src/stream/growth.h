@@ -51,9 +51,10 @@ class Growth {
   std::deque<Grown> grown_;
   StampNs too_many_ns_ = NEVER_NS;            // of some that were not kept
   std::unordered_set<std::uint64_t> voxels_;  // of grown_, packed
-
-  bool isGroup(const VoxelKey& voxel) const;
 };
+
+/// Whether the voxel and others of these (packed) are Growth::GROUP or more that touch each other.
+bool isOfGroup(const VoxelKey& voxel, const std::unordered_set<std::uint64_t>& voxels);
 
 /// A voxel's key as one number.
 inline std::uint64_t packed(const VoxelKey& key) {

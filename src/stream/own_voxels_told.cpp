@@ -1,5 +1,6 @@
 // What becomes of a map without what is a body's own, and what is said of it.
 #include <algorithm>
+#include <unordered_set>
 #include <utility>
 
 #include "base/next_surface.h"
@@ -9,6 +10,9 @@
 
 namespace dccd {
 namespace {
+
+/// [s] For so long after its picture what appeared there is near: pictures of other sensors come meanwhile.
+constexpr double SEEN_OF_LATE_S = 0.05;
 
 std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
 
@@ -60,6 +64,18 @@ ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelS
   return withoutOwn(std::move(map), trusted, bodies, trust_first);
 }
 
+/// What was seen of late, without what a sensor's stray points may have made: fewer than Growth::GROUP voxels that touch
+/// each other.
+std::vector<OccupiedLeaf> OwnVoxelFinder::seenInGroups(StampNs stamp_ns) const {
+  std::unordered_set<std::uint64_t> keys;
+  for (const auto& [key, seen] : seen_alone_)
+    if (seen.seen_ns >= stamp_ns - nanoseconds(SEEN_OF_LATE_S)) keys.insert(key);
+  std::vector<OccupiedLeaf> found;
+  for (const OccupiedLeaf& voxel : seen_)
+    if (keys.count(packed(voxel.min)) > 0 && isOfGroup(voxel.min, keys)) found.push_back(voxel);
+  return found;
+}
+
 ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trusted,
                                        const std::vector<TrackedBody>& bodies, bool trust_first) {
   const double resolution_m = map.surface->resolution();
@@ -82,7 +98,8 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
     if (voxel.doubted) doubted.push_back({voxel.key, 1});
   }
   map.own.doubted_surface = doubted.empty() ? nullptr : VoxelSurface::build(resolution_m, std::move(doubted));
-  map.own.seen = seen_.empty() ? nullptr : share(seen_);
+  std::vector<OccupiedLeaf> seen = seenInGroups(map.stamp_ns);
+  map.own.seen = seen.empty() ? nullptr : share(std::move(seen));
   map.own.voxels = share(std::move(voxels));
   describe(bodies, trust_first, map.known != nullptr, gap_, map.own);
   if (!without.empty()) {

@@ -58,6 +58,17 @@ TEST(ApproachLimits, LeaveWhatIsBetweenLessThePartnersBound) {
   EXPECT_EQ(ToolOverTable().run(0.15).of.size(), 1u) << "what is beyond max_m the fastest speed keeps away";
 }
 
+TEST(ApproachLimits, CountWhatASensorSawTooSeldom) {
+  ToolOverTable over;
+  over.step.map.own.seen = share(std::vector<OccupiedLeaf>{{{32769, 32769, 32768}, 1}});  // 0.05 m below the tool
+  const ApproachLimits limits = over.run();
+  double slowest_m_s = NEAR_M;
+  for (const ApproachLimit& limit : limits.of)
+    if (limit.partner == OBSTACLE_BODY) slowest_m_s = std::min(slowest_m_s, limit.speed_m_s);
+  EXPECT_LE(slowest_m_s, 0.05 / LIMITS_S);
+  EXPECT_NEAR(slowest_m_s, 0.05 / LIMITS_S, 1e-6);
+}
+
 TEST(ApproachLimits, HoldInTheFixedFrameWhereTheMapIsTurned) {
   ToolOverTable turned;
   const Eigen::Isometry3d moved(Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()));

@@ -86,6 +86,15 @@ TEST(IntendedPath, OnADiveTheTimeIsWhenTheTubesMayTouch) {
   EXPECT_EQ(along.contact, PathContact::FREE);
 }
 
+TEST(IntendedPath, WhatASensorSawTooSeldomIsMet) {
+  Scene dive = Scene(0.201).goes({0, 0, -0.5}, 2).tube(0.001, 0);
+  dive.step.map.own.seen = share(std::vector<OccupiedLeaf>{{{32768, 32768, 32769}, 1}});  // its top at 0.1 m
+  const AlongPath along = dive.run();
+  EXPECT_TRUE(along.rests_on_path);
+  EXPECT_LE(along.until.seconds(), 0.1 / 0.25);
+  EXPECT_GE(along.until.seconds(), 0.97 * 0.1 / 0.25);
+}
+
 TEST(IntendedPath, ASheetAcrossAllAxesIsMetWhereItIs) {
   Eigen::Isometry3d turned(Eigen::Translation3d(0.3, -0.2, 0.5));
   turned.rotate(Eigen::AngleAxisd(0.7, Vec3(1, 0.6, 0.3).normalized()));

@@ -193,7 +193,7 @@ TEST(SafeUntilMessage, SaysUntilWhenWhoAndWhatItRestsOn) {
   Outcome near = outcome;
   near.step = std::make_shared<const Step>(doubtful);
   EXPECT_EQ(toSafeUntil(near, watch, bounds, ros::Time(1.1), "world").assumed[2],
-            "voxels near bodies that are in doubt are no obstacle: 25");
+            "voxels of the map in doubt are no obstacle: 25");
 }
 
 TEST(SafeUntilMessage, NoMoreIsLeftThanWasPromisedWhereStampsAreAhead) {
