@@ -268,7 +268,7 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
   } else {
     config.bodies_listed = true;
     if (reader.has("topic")) {
-      reader.fail("topic", "(mesh:= of the launch files) has no place beside bodies; set bodies/NAME/topic instead");
+      reader.fail("topic", "has no place beside bodies; set bodies/NAME/topic instead");
     }
     if (reader.has("topology")) {
       reader.fail("topology",

@@ -134,7 +134,8 @@ std::string MonitorConfig::mapName() const { return takesMapFileAlone() ? octoma
 void MonitorConfig::checkMapNames() const {
   if (!cloud_named || !octomap_topic_named) return;
   throw ParameterError("the map is to come both from the clouds on obstacle_cloud_topic '" + clouds.front().topic +
-                       "' and from octomap_topic '" + octomap_topic + "'; remove one of the two");
+                       "' and from octomap_topic '" + octomap_topic +
+                       "' (obstacle_cloud:= and octomap:= of the launch files); remove one of the two");
 }
 
 bool MonitorConfig::namesOctomap() const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <sstream>
 #include <utility>
 
@@ -27,6 +28,20 @@ std::string notThis(const ParameterTree& value) {
   return value.kind == Kind::TEXT ? ", not '" + value.text.substr(0, 60) + "'" : "";
 }
 
+/// What was typed if it came by the launch files, where their argument has another name than the node's parameter.
+std::string argumentOf(const std::string& parameter) {
+  static const std::map<std::string, std::string> ARGUMENTS = {{"~topic", "mesh"},
+                                                               {"~octomap_topic", "octomap"},
+                                                               {"~obstacle_cloud_topic", "obstacle_cloud"},
+                                                               {"~topology/rows", "rows"},
+                                                               {"~topology/cols", "cols"},
+                                                               {"~topology/source", "topology"},
+                                                               {"~robot/semantic", "semantic"},
+                                                               {"~robot/description", "robot"}};
+  const auto found = ARGUMENTS.find(parameter);
+  return found == ARGUMENTS.end() ? "" : " (" + found->second + ":= of the launch files)";
+}
+
 }  // namespace
 
 const char* kindName(const ParameterTree& value) {
@@ -50,7 +65,7 @@ void ParameterReader::fail(const std::string& name, const std::string& what) con
   const std::string where = tree_.file.empty() || is_option ? "parameter "
                             : line == 0                     ? tree_.file + ": "
                                                             : tree_.file + ":" + std::to_string(line) + ": ";
-  throw ParameterError(where + full + (full.empty() ? "" : " ") + what);
+  throw ParameterError(where + full + argumentOf(full) + (full.empty() ? "" : " ") + what);
 }
 
 void ParameterReader::failKind(const std::string& name, const ParameterTree& value, const std::string& needed) const {

@@ -251,7 +251,9 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
     result.needed_m =
         bounded ? separationDistance(1, speeds.slowed, speeds.other, law) : std::numeric_limits<double>::quiet_NaN();
     std::ostringstream text;
-    text << pairOf(outcome, pair) << " are " << distance_m << " m apart, and " << result.needed_m
+    const bool is_bound = pair.at_end.status == ClearanceStatus::FARTHER;
+    text << pairOf(outcome, pair) << " are " << (is_bound ? "at least " : "") << distance_m << " m apart"
+         << (is_bound ? " (farther is not measured: clearance/max_m)" : "") << ", and " << result.needed_m
          << " m are needed at full speed";
     result.reason = !bounded         ? unboundedReason(speeds.unbounded)
                     : distance_m > 0 ? text.str()

@@ -118,12 +118,16 @@ class ReportPageTest(FolderTestCase):
         driver.get(self.page.as_uri())
         return driver
 
-    @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
-    def test_the_player(self):
-        data = json.loads((self.folder / 'report.json').read_text())
+    def player(self):
         page = self.browser()
         if 'without three.js' in page.find_element('id', 'player_note').text:
             self.skipTest('the tools were built without libjs-three')
+        return page
+
+    @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
+    def test_the_player(self):
+        data = json.loads((self.folder / 'report.json').read_text())
+        page = self.player()
 
         def text(name):
             return page.find_element('id', name).text
@@ -192,6 +196,13 @@ class ReportPageTest(FolderTestCase):
         self.assertLess(max(corner('dark')), 64)
         self.assertGreater(min(corner('light')), 192)
 
+        # The legend is a list, and no two colour bars are alike.
+        legend = [one.text for one in page.find_elements('css selector', 'ul#legend > li')]
+        for row, words in zip(legend, ('contact, within its step: early.*late', 'patch, within the run: early.*late', 'grey: expected', 'cloth')):
+            self.assertRegex(row, words)
+        bars = [one.value_of_css_property('background-image') for one in page.find_elements('css selector', '#legend .scale')]
+        self.assertEqual((len(bars), len(set(bars))), (2, 2), bars)
+
         # Step by step, and playing to a pause.
         before = page.execute_script('return player.time()')
         page.find_element('id', 'on').click()
@@ -219,6 +230,29 @@ class ReportPageTest(FolderTestCase):
         self.assertIn(first['stamp'], text('firsts'))
         self.assertEqual(page.execute_script("return performance.getEntriesByType('resource').length"), 0)
         self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
+
+    @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
+    def test_a_contact_behind_a_surface_is_drawn_through(self):
+        """Seen from above the cloth hides what touches the table, from below the table does."""
+        page = self.player()
+
+        def colours():
+            """Of each contact that no later one and no ring lies on: its own colour, and that of the picture there."""
+            return page.execute_async_script("""const done = arguments[0]; requestAnimationFrame(() => { player.paint();
+                const c = document.getElementById('canvas'), g = c.getContext('webgl2') || c.getContext('webgl'), box = c.getBoundingClientRect();
+                const all = player.items().map((item, i) => [item, ...player.screenOf(i)]);
+                const covers = ([a, u, v], x, y) => { const d = Math.hypot(x - u, y - v); return a.kind === 'contact' ? d < 7 : d > 3 && d < 13; };
+                done(all.filter(([a, x, y], i) => a.kind === 'contact' && !all.slice(i + 1).some(b => covers(b, x, y))).map(([a, x, y]) => {
+                    const p = new Uint8Array(4);
+                    g.readPixels((x - box.left) * c.width / box.width, (box.bottom - y) * c.height / box.height, 1, 1, g.RGBA, g.UNSIGNED_BYTE, p);
+                    return [a.rgb.map(v => Math.round(255 * v)), [...p].slice(0, 3)]; })); });""")
+        page.execute_script("""player.seek(player.frames.filter(f => f.details).reduce((a, b) => b.details.c.length > a.details.c.length ? b : a).to)""")
+        for drag in (0, -150):
+            if drag:
+                ActionChains(page).drag_and_drop_by_offset(page.find_element('id', 'canvas'), 0, drag).perform()
+            found = colours()
+            self.assertGreater(len(found), 10, drag)
+            self.assertEqual([(drag, own, seen) for own, seen in found if max(abs(a - b) for a, b in zip(own, seen)) > 4], [])
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_one_long_step_does_not_flatten_the_others_and_no_cure_is_cut(self):

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <limits>
+#include <regex>
 
 #include "support/said.h"
 #include "unit/ros/parameter_support.h"
@@ -60,6 +63,30 @@ TEST(Parameters, WrongTypesAreRefused) {
   });
 }
 
+// Who typed `topology:=polylin` never wrote `topology/source`.
+TEST(Parameters, WhereTheArgumentHasAnotherNameTheSentenceHasBoth) {
+  std::ifstream in(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/launch/monitor.launch");
+  const std::string launch{std::istreambuf_iterator<char>(in), {}};
+  const std::regex row(R"re(<param if="\$\(eval arg\('(\w+)'\) not in \('', '-'\)\)" name="([^"]+)")re");
+  std::size_t others = 0;
+  for (std::sregex_iterator one(launch.begin(), launch.end(), row), end; one != end; ++one) {
+    const std::string argument = (*one)[1], name = (*one)[2], section = name.substr(0, name.find('/'));
+    XmlRpcValue tree = parameters("robot: {description: d}");
+    (section == name ? tree[name] : tree[section][name.substr(section.size() + 1)]) = parameters("list: [1]")["list"];
+    const std::string error = errorOf(tree);
+    const std::string words = argument == name ? "" : " (" + argument + ":= of the launch files)";
+    EXPECT_TRUE(mentions(error, "parameter ~" + name + words + " is a list, ")) << error;
+    others += argument != name;
+  }
+  EXPECT_EQ(others, 8U);
+  expectMistakes(
+      {{"topology: {source: polylin}",
+        "parameter ~topology/source (topology:= of the launch files) is 'polylin', it must be one of auto, "}});
+  EXPECT_TRUE(mentions(said<ParameterError>([] { readConfig(parseYaml("topology: {source: a}", "p.yaml"), ""); }),
+                       "p.yaml:1: topology/source is 'a', "))
+      << "a file was typed";
+}
+
 TEST(Parameters, ValuesOutOfRangeAreRefused) {
   expectMistakes({
       {"accuracy: exactly", "~accuracy is 'exactly', it must be one of conservative, exact; nearest is 'exact'"},
@@ -99,8 +126,9 @@ TEST(Parameters, ValuesOutOfRangeAreRefused) {
 TEST(Parameters, ContradictionsSayWhatToWrite) {
   expectMistakes({
       {"topology: {rows: 3}", "both or neither"},
-      {"topology: {rows: 1, cols: 4}", "~topology/rows and cols must be 2 or more"},
-      {"topology: {source: polyline, rows: 2, cols: 3}", "~topology/rows has no meaning for a polyline"},
+      {"topology: {rows: 1, cols: 4}", "~topology/rows (rows:= of the launch files) and cols must be 2 or more"},
+      {"topology: {source: polyline, rows: 2, cols: 3}",
+       "~topology/rows (rows:= of the launch files) has no meaning for a polyline"},
       {"topic: /a, bodies: {cloth: {topic: /b}}", "~topic (mesh:= of the launch files) has no place beside bodies"},
       {"topology: {rows: 3, cols: 4}, bodies: {cloth: {topic: /b}}",
        "~topology (topology:=, rows:= and cols:= of the launch files) has no place beside bodies; set "
@@ -109,9 +137,8 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"exclude_boxes: [[1, 0]]", "~exclude_boxes must hold lists of 6 numbers"},
       {"exclude_boxes: [[a, 0, 0, 1, 1, 1]]", "~exclude_boxes holds a string where a number is needed"},
       {"obstacle_cloud_topic: /points, octomap_topic: /map",
-       "the map is to come both from the clouds on obstacle_cloud_topic '/points' and from octomap_topic '/map'; "
-       "remove "
-       "one of the two"},
+       "the map is to come both from the clouds on obstacle_cloud_topic '/points' and from octomap_topic '/map' "
+       "(obstacle_cloud:= and octomap:= of the launch files); remove one of the two"},
       {"obstacle_resolution_m: 0.0005, obstacle_max_range_m: 5.0",
        "~obstacle_resolution_m is 0.0005, too fine for obstacle_max_range_m 5: a ray has 4096 voxels at most; write at "
        "least 0.0012207"},

@@ -41,7 +41,7 @@ TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
   EXPECT_FALSE(with("octomap_topic: /map, effects: {octomap: \"off\"}").namesOctomap());
   EXPECT_TRUE(with("topic: mesh").bodies[0].topic_named);
   EXPECT_FALSE(with("default_topic: /cloth").bodies[0].topic_named);
-  expectMistakes({{"octomap_topic: \"\"", "octomap_topic is empty; remove it"}});
+  expectMistakes({{"octomap_topic: \"\"", "~octomap_topic (octomap:= of the launch files) is empty; remove it"}});
 }
 
 // A frame of tf2 has none, so that nothing ever had a place.

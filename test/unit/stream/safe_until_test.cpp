@@ -522,6 +522,11 @@ TEST(SpeedScale, IsTheLeastOfAllPairsAndSaysWhich) {
   EXPECT_LT(near.scale, 1);
   EXPECT_EQ(near.limiting, 1u);
   EXPECT_EQ(near.reason, "'floor' and 'tip' are 0.3 m apart, and 0.47 m are needed at full speed");
+  const SpeedScale far = speedScale(answered({between(0, 1, apart(0.3, ClearanceStatus::FARTHER))}), bounds, LAW);
+  EXPECT_EQ(far.scale, near.scale);
+  EXPECT_EQ(far.reason,
+            "'floor' and 'tip' are at least 0.3 m apart (farther is not measured: clearance/max_m), and 0.47 m are "
+            "needed at full speed");
 }
 
 // What an arm did of late says nothing of what it does once it may: it creeps or rests before a wall, and sets off.
