@@ -71,8 +71,8 @@ class TransformFeed {
   };
   /// Ascending: between the two, neither included, each stamp of a transform that target_from_source is made of then.
   /// Added to `changes`, newest first: from when on, after from_ns and up to to_ns, it was made of other frames than
-  /// before, or, where to_ns lies between two of other parents, is made from the second on. Where tf2 has it just before
-  /// that nobody said.
+  /// before, or, where to_ns lies between two of other parents, is made from the second on. Where tf2 has it just
+  /// before that nobody said.
   std::vector<StampNs> stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                      StampNs to_ns, std::vector<NewParent>& changes) const;
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.

@@ -81,10 +81,8 @@ std::shared_ptr<const VoxelSurface> withSeen(const ObstacleMap& map, const std::
   const double resolution_m = reduced->resolution();
   std::vector<OccupiedLeaf> leaves = reduced->leaves();
   const auto add = [&](const OccupiedLeaf& leaf) { leaves.push_back(leaf); };
-  const RemainingLeaves seen =
-      leavesOutside(*map.own.seen, resolution_m, map.map_from_fixed.inverse(), exclude_boxes);
-  for (const OccupiedLeaf& leaf : seen.leaves)
-    visitUncovered(VoxelSurface::Impl::of(*reduced).tree, leaf, add);
+  const RemainingLeaves seen = leavesOutside(*map.own.seen, resolution_m, map.map_from_fixed.inverse(), exclude_boxes);
+  for (const OccupiedLeaf& leaf : seen.leaves) visitUncovered(VoxelSurface::Impl::of(*reduced).tree, leaf, add);
   return nextSurface(resolution_m, std::move(leaves), *reduced);
 }
 

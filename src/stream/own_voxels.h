@@ -30,8 +30,8 @@
 
 namespace dccd {
 
-/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these, and
-/// `seen` those that its last cloud saw.
+/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these,
+/// and `seen` those that its last cloud saw.
 constexpr std::uint16_t NOBODY = 0xffff;
 
 /// Not thread-safe.

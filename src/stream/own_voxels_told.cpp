@@ -64,8 +64,8 @@ ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelS
   return withoutOwn(std::move(map), trusted, bodies, trust_first);
 }
 
-/// What was seen of late, without what a sensor's stray points may have made: fewer than Growth::GROUP voxels that touch
-/// each other.
+/// What was seen of late, without what a sensor's stray points may have made: fewer than Growth::GROUP voxels that
+/// touch each other.
 std::vector<OccupiedLeaf> OwnVoxelFinder::seenInGroups(StampNs stamp_ns) const {
   std::unordered_set<std::uint64_t> keys;
   for (const auto& [key, seen] : seen_alone_)

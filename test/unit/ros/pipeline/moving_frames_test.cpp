@@ -165,7 +165,8 @@ TEST(RigidBodies, WhoseFrameHasAnotherParentWithinAStepHaveNoPlaceInIt) {
   }
 }
 
-// The cloth's frame comes after the arm last had the tip, and before the stand has it: the arm may have dipped meanwhile.
+// The cloth's frame comes after the arm last had the tip, and before the stand has it: the arm may have dipped
+// meanwhile.
 TEST(RigidBodies, HaveNoPlaceBetweenTwoParents) {
   for (const double at_s : {0.1, 0.11, 0.12}) {
     Moving scene(clothAndTip());
