@@ -577,7 +577,7 @@ def damaged(message, r):
     elif isinstance(message, CameraInfo):
         message.P = [r.choice([nan, 0.0])] * 12
     elif isinstance(message, PolygonMesh):
-        message.polygons[0].vertices[1] = 999
+        message.polygons[0].vertices = (0, 999, 1)
     elif isinstance(message, MeshStamped) and r.random() < .5:
         message.triangles[0].vertex_indices = (0, 1, 999)
     else:
