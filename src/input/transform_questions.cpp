@@ -223,7 +223,12 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
         return sample != frame.sent.begin() &&
                (sample->second.gap || sample->first - std::prev(sample)->first > LONGEST_HOLE_NS);
       };
-      bool has_gap = one != frame.sent.end() && followsGap(one) && std::prev(one)->first < end_ns;
+      const bool is_between =
+          one != frame.sent.end() && one != frame.sent.begin() && std::prev(one)->first < end_ns;
+      bool has_gap = is_between && followsGap(one);
+      // Between two parents it may be anywhere, and not only where tf2 leaves it until the later one.
+      const bool is_handed_over = is_between && end_ns == to_ns && one->second.parent != parent;
+      if (is_handed_over) changes.push_back({end_ns, &frame.name, &parent->name, &one->second.parent->name});
       while (one != frame.sent.begin()) {
         --one;
         has_gap = has_gap || (one->first > from_ns && followsGap(one));
@@ -235,7 +240,7 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
       }
       if (has_gap) changes.push_back({end_ns, &frame.name, nullptr, nullptr});
       const bool has_all = since_ns <= from_ns || (before == parent && !frame.is_cut);
-      if (has_all && !has_gap && stamps.size() == found_before) frame.none_between = question;
+      if (has_all && !has_gap && !is_handed_over && stamps.size() == found_before) frame.none_between = question;
       if (has_all || since_ns <= last.stamp_ns) return;
       last = {since_ns, &frame.name, before == parent ? nullptr : &before->name, &parent->name};
     });

@@ -100,6 +100,7 @@ class World:
             for kind in faults if faults is not None else [r.choice(FAULTS) for _ in range(r.choice([0, 1, 1, 2, 3]))]:
                 self.fault(kind)
         self.ahead(random.Random(seed + 2 * NS))
+        self.handed_over(random.Random(seed + 3 * NS))
         self.rows.sort(key=lambda row: row[2])
         for before, row in zip(self.rows, self.rows[1:]):  # no two at once
             row[2] = max(row[2], before[2] + 1000)
@@ -308,6 +309,18 @@ class World:
             for axis in 'xyz':
                 setattr(message.twist.linear, axis, r.choice([0, r.uniform(-.2, .2), r.uniform(-.2, .2), math.nan if r.random() < .1 else 0]))
             self.add('/collision_monitor/intended', message, at, r.uniform(0, .05))
+
+    def handed_over(self, r):
+        """A frame gets another parent, for a while or for good."""
+        if self.tame or r.random() < .8:
+            return
+        rows = [row for row in self.rows if row[0] == '/tf']
+        child = r.choice(rows)[1].transforms[0].child_frame_id
+        mine = [row[1].transforms[0] for row in rows if row[1].transforms[0].child_frame_id == child]
+        at, parent = r.randrange(len(mine)), r.choice(['world', 'mount'])
+        for one in mine[at:at + r.choice([1, 3, len(mine)])]:
+            one.header.frame_id = parent
+        self.faults.append('%s is handed over to %s at %d' % (child, parent, at))
 
     def options(self):
         r, p = self.r, self.params
