@@ -223,8 +223,7 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
         return sample != frame.sent.begin() &&
                (sample->second.gap || sample->first - std::prev(sample)->first > LONGEST_HOLE_NS);
       };
-      const bool is_between =
-          one != frame.sent.end() && one != frame.sent.begin() && std::prev(one)->first < end_ns;
+      const bool is_between = one != frame.sent.end() && one != frame.sent.begin() && std::prev(one)->first < end_ns;
       bool has_gap = is_between && followsGap(one);
       // Between two parents it may be anywhere, and not only where tf2 leaves it until the later one.
       const bool is_handed_over = is_between && end_ns == to_ns && one->second.parent != parent;
