@@ -506,7 +506,7 @@ def leaves_of(data, binary, bytes_a_node=4):
 
 def octomap(data, binary, kind, resolution):
     data = bytes(b & 255 for b in data) if not isinstance(data, bytes) else data
-    if data[:1] == b'#':
+    if data[:9] == b'# Octomap':
         head, data = data.split(b'\ndata\n', 1)
         words = dict(line.split(None, 1) for line in head.decode('latin-1').splitlines() if not line.startswith('#'))
         kind, resolution, binary = words.get('id', kind).strip(), float(words['res']), b'binary' in head.split(b'\n')[0]

@@ -253,7 +253,7 @@ class Stream:
         while self.taken < len(self.every) and self.every[self.taken].came <= self.until:
             frame = self.every[self.taken]
             if self.held and self.held[-1].stamp > frame.stamp + NS:
-                self.voided = []  # time begins anew
+                self.held, self.voided = [], []  # time begins anew
             while self.held and self.held[-1].stamp > frame.stamp:
                 late = self.held.pop()
                 self.voided += [late.stamp] if late.stamp <= frame.stamp + NS else []

@@ -2,6 +2,7 @@
 // on. ~wanted and ~twist (geometry_msgs/TwistStamped) are of the frame ~link, about its origin, in the axes of the
 // monitor's fixed frame; all links of ~links (default: all that the monitor speaks of) go with it. What is old, or
 // unknown, is no reason to go: then ~twist is 0. This is no safety function; see doc/guarantees.md.
+#include <cmath>
 #include <deque>
 #include <set>
 #include <string>
@@ -18,6 +19,7 @@ class GuardTwist {
     node_.getParam("link", link_);
     std::vector<std::string> links;
     if (node_.getParam("links", links)) links_.insert(links.begin(), links.end());
+    if (!links_.empty()) links_.insert(link_);
     stopping_time_s_ = node_.param("stopping_time_s", 0.1);
     max_age_s_ = node_.param("max_age_s", 0.2);
     twist_ = node_.advertise<geometry_msgs::TwistStamped>("twist", 1);
@@ -42,9 +44,13 @@ class GuardTwist {
     if (!said.unknown.empty()) return said.unknown[0];
     const double since_s = now_s - said.header.stamp.toSec(), left_s = said.horizon - since_s - stopping_time_s_;
     if (!(since_s >= 0 && left_s > PERIOD_S)) return "the limits are " + std::to_string(since_s) + " s old";
-    std::set<std::string> moving = links_;
-    if (moving.empty()) moving.insert(said.links.begin(), said.links.end());
-    const auto moves = [&](const std::string& name) { return moving.count(name) > 0; };
+    std::set<std::string> moving;  // bodies
+    for (const std::string& body : said.links)
+      if (links_.empty() || links_.count(body) || links_.count(guard::linkOf(body))) moving.insert(body);
+    const auto moves = [&](const std::string& body) { return moving.count(body) > 0; };
+    for (const std::string& link : links_)
+      if (std::none_of(moving.begin(), moving.end(), [&](auto& m) { return m == link || guard::linkOf(m) == link; }))
+        return "the limits do not speak of '" + link + "'";
     std::size_t own = 0;
     while (own < said.links.size() && said.links[own] != link_) ++own;
     if (own == said.links.size()) return "the limits do not speak of '" + link_ + "'";
@@ -77,7 +83,7 @@ class GuardTwist {
     const ros::Time now = ros::Time::now();
     guard::Twist twist = guard::Twist::Zero();
     std::string why = "nothing is wanted";
-    if (asked_ && (now - asked_->header.stamp).toSec() <= max_age_s_) {
+    if (asked_ && std::abs((now - asked_->header.stamp).toSec()) <= max_age_s_) {
       twist << vectorOf(asked_->twist.linear), vectorOf(asked_->twist.angular);
       why = twist.allFinite() ? change(now.toSec(), twist) : "what is wanted is not finite";
     }

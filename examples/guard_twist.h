@@ -3,11 +3,19 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <string>
 #include <vector>
 
 namespace guard {
 
 using Twist = Eigen::Matrix<double, 6, 1>;  ///< linear, m/s, then angular, rad/s, in the fixed frame
+
+/// Whose the body of ~limits is: the second one of the link `arm` is `arm/2`.
+inline std::string linkOf(const std::string& body) {
+  const std::size_t slash = body.find_last_not_of("0123456789");
+  const bool is_numbered = slash != std::string::npos && slash + 1 < body.size() && body[slash] == '/';
+  return is_numbered ? body.substr(0, slash) : body;
+}
 
 /// along . twist + turns |angular|^2 is at most `most`.
 struct Row {

@@ -3,6 +3,7 @@
 
 It knows no turning: what is wanted of ~wanted/twist/angular is left out, and ~links all move with the twist. No safety function.
 """
+import re
 import time
 
 import numpy as np
@@ -40,7 +41,11 @@ class GuardRule:
             return still, 'the limits are %.2f s old' % (now - begin)
         ends = [at for at, _ in self.sent[1:]] + [now]
         gone = sum((max(0, end - max(begin, at)) * v for (at, v), end in zip(self.sent, ends)), np.zeros(3))
-        moved = self.links or set(said.links)
+        link_of = {body: re.sub(r'/\d+$', '', body) for body in said.links}  # the second body of `arm` is `arm/2`
+        unknown = self.links - set(link_of) - set(link_of.values())
+        if unknown:
+            return still, 'the limits do not speak of %s' % ', '.join(sorted(unknown))
+        moved = {body for body, link in link_of.items() if not self.links or self.links & {body, link}}
         rows = [((n.x, n.y, n.z), speed) for n, speed, link, partner in zip(said.normals, said.speeds, said.link, said.partners)
                 if said.links[link] in moved and partner not in moved]
         normals = np.array([n for n, _ in rows]).reshape(-1, 3)
@@ -71,7 +76,7 @@ def main():
     while not rospy.is_shutdown():
         now, asked = rospy.Time.now().to_sec(), wanted[0]
         v = asked.twist.linear
-        fresh = now - asked.header.stamp.to_sec() <= max_age_s
+        fresh = abs(now - asked.header.stamp.to_sec()) <= max_age_s
         out = TwistStamped()
         out.header.stamp = rospy.Time.from_sec(now)
         out.twist.linear.x, out.twist.linear.y, out.twist.linear.z = rule.velocity(now, (v.x, v.y, v.z) if fresh else (0, 0, 0))

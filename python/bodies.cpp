@@ -226,6 +226,10 @@ std::vector<Body> bodiesOf(py::handle value) {
     if (bodies.back().name.empty()) bodies.back().name = "body_" + std::to_string(bodies.size() - 1);
   }
   for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (bodies[b].name == MAP_NAME || bodies[b].name == SELF_NAME) {
+      throw py::value_error("bodies[" + std::to_string(b) + "]: where pairs are named '" + bodies[b].name +
+                            "' is the map, or the body itself; give it another name");
+    }
     if (bodyNamed(bodies[b].name, bodies) != b) {
       throw py::value_error("bodies[" + std::to_string(b) + "]: another body is called '" + bodies[b].name + "', too");
     }

@@ -31,7 +31,7 @@ struct RobotConfig {
   std::string description;          ///< a parameter's name or a file; empty: no robot
   std::string semantic;             ///< the same of the SRDF; empty: none
   double padding_m = 0;             ///< minimum separation of a link
-  double scale = 1;                 ///< of the geometry about the link's origin
+  double scale = 1;                 ///< of each collision element about its middle
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link
   std::optional<SpeedBound> speed;  ///< of each link
   std::size_t max_own_voxels = 0;   ///< of the links and of what they hold; with more nothing is proved; 0: no limit

@@ -84,7 +84,8 @@ PinholeView readPinhole(WireReader& wire) {
   view.width = wire.read<std::uint32_t>("width");
   wire.readString("distortion_model");
   const WireSpan<double> distortion = wire.readArray<double>("D");
-  wire.skip(9 * sizeof(double), "K");
+  std::array<double, 9> k{};
+  for (double& value : k) value = wire.read<double>("K");
   const auto tell = [&](const char* name, std::size_t i, double value, double rectified) {
     if (value == rectified || !view.unrectified.empty()) return;
     std::ostringstream text;
@@ -95,6 +96,8 @@ PinholeView readPinhole(WireReader& wire) {
   for (std::size_t i = 0; i < 9; ++i) tell("R", i, wire.read<double>("R"), i % 4 == 0 ? 1 : 0);
   std::array<double, 12> p{};
   for (double& value : p) value = wire.read<double>("P");
+  for (const std::size_t i : {0u, 2u, 4u, 5u})  // without a focal length K tells nothing
+    if (k[0] != 0) tell("K", i, k[i], p[i + i / 3]);
   const auto binning_x = wire.read<std::uint32_t>("binning_x"), binning_y = wire.read<std::uint32_t>("binning_y");
   const auto left = wire.read<std::uint32_t>("roi.x_offset"), top = wire.read<std::uint32_t>("roi.y_offset");
   wire.skip(2 * sizeof(std::uint32_t), "roi");

@@ -172,7 +172,7 @@ SensorView CloudMapping::readPicture(const CloudMessage& message, Reading& readi
   // Where a rectified picture looks P tells, in the frame that it names, as to depth_image_proc.
   if (!pinhole->unrectified.empty() && !isRectified(source.topic)) {
     throw WireError(of + pinhole->unrectified +
-                    ": pictures with distortion (D not 0, R not the identity) are not "
+                    ": pictures with distortion (D not 0, R not the identity, K not P's) are not "
                     "rectified; take the driver's image_rect, or its cloud");
   }
   if (pinhole->width != picture.width || pinhole->height != picture.height) {

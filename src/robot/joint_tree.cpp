@@ -28,7 +28,15 @@ Eigen::Isometry3d originOf(const urdf::Pose& pose) {
 
 }  // namespace
 
-JointTree::JointTree(const std::string& urdf) : model_(parseJoints(urdf)) {}
+JointTree::JointTree(const std::string& urdf) : model_(parseJoints(urdf)) {
+  for (const auto& [name, joint] : model_->joints_) {
+    if (!joint->mimic) continue;
+    const auto leader = model_->joints_.find(joint->mimic->joint_name);
+    if (leader != model_->joints_.end() && !leader->second->mimic) continue;
+    const std::string what = leader == model_->joints_.end() ? "is not there" : "follows another one itself";
+    throw RobotTextError("joint '" + name + "' follows '" + joint->mimic->joint_name + "', which " + what);
+  }
+}
 
 const std::string& JointTree::root() const { return model_->getRoot()->name; }
 

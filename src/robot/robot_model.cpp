@@ -139,7 +139,9 @@ class RobotMaker {
         continue;
       }
       try {
-        MeshResource mesh = meshOf(*link.collision_array[i], config_.scaleOf(link.name), what);
+        const double scale = config_.scaleOf(link.name);
+        MeshResource mesh = meshOf(*link.collision_array[i], scale, what);
+        if (scale < 1) robot_.excluded.push_back(what + " but for a scale of " + shown(scale));
         robot_.parts.push_back(
             {link.name, i == 0 ? link.name : link.name + "/" + number, std::make_shared<const MeshResource>(mesh)});
         ++accounted;
@@ -157,9 +159,11 @@ class RobotMaker {
   MeshResource meshOf(const urdf::Collision& collision, double scale, const std::string& what) {
     MeshResource mesh = shapeOf(*collision.geometry, tolerance_m_ / scale, what);
     const Eigen::Isometry3d origin = poseOf(collision.origin);
-    Eigen::AlignedBox3d bounds;
+    Eigen::AlignedBox3d bounds, own;
+    for (const Vec3& p : mesh.positions) own.extend(p);
+    const Vec3 shift = (1 - scale) * own.center();  // about its middle: what is larger is where it was
     for (Vec3& p : mesh.positions) {
-      p = scale * (origin * p);
+      p = origin * (shift + scale * p);
       if (!p.allFinite()) throw std::invalid_argument("a coordinate is not finite");
       bounds.extend(p);
     }

@@ -194,7 +194,8 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   answer(Question::TIME, outcome.cut ? StepStatus::TRUNCATED : StepStatus::DEADLINE, cutInWords(options, outcome));
   answer(Question::PARTS, StepStatus::PARTIAL, tooFewPartsInWords(step, needed_parts, outcome.substeps));
   const bool lacks_map = options.obstacle_expected && !step.map.surface;
-  answer(Question::MAP_IS_THERE, StepStatus::NO_MAP, lacks_map ? step.map.problem + "; checked without it" : "");
+  const std::string why = step.map.problem.empty() ? "there is no map" : step.map.problem;
+  answer(Question::MAP_IS_THERE, StepStatus::NO_MAP, lacks_map ? why + "; checked without it" : "");
   // None of these changes the status: the step was computed as it was asked for.
   claim.answer(Question::MAP_IS_NO_BODY, step.map.own.doubt);
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {

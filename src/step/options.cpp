@@ -16,6 +16,20 @@ void checkHoldsDistance(const Options& options, const std::string& what) {
                               "; a distance above 0 needs accuracy = conservative");
 }
 
+/// Which of two would hold is the order's matter.
+static void checkSeparations(const std::vector<Body>& bodies) {
+  for (std::size_t a = 0; a < bodies.size(); ++a) {
+    for (const auto& [b, separation_m] : bodies[a].separations) {
+      const double* const back_m = b < bodies.size() ? namedSeparation(bodies[b], a) : nullptr;
+      for (const double* const named_m : {namedSeparation(bodies[a], b), back_m}) {
+        if (!named_m || *named_m == separation_m) continue;
+        throw std::invalid_argument("body '" + bodies[a].name + "' and its partner name two separations, " +
+                                    std::to_string(separation_m) + " and " + std::to_string(*named_m) + " m");
+      }
+    }
+  }
+}
+
 void check(const Options& options, const std::vector<Body>& bodies) {
   // Asked in each step: sentences are made for what is wrong.
   const auto refuse = [](const std::string& text) { throw std::invalid_argument(text); };
@@ -46,6 +60,7 @@ void check(const Options& options, const std::vector<Body>& bodies) {
   }
   if (!bodies.empty()) checkPartners(options.expected, bodies.size());
   makeRung(options.accuracy);  // throws where a number of the accuracy is out of range
+  checkSeparations(bodies);
   const double separation_m = largestSeparation(bodies);
   if (separation_m > 0) checkHoldsDistance(options, "minimum_separation_m = " + std::to_string(separation_m));
 }

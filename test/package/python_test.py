@@ -518,6 +518,9 @@ class ArraysTest(PythonTestCase):
                 ([], ValueError, 'there is no body'),
                 (self.t0, TypeError, 'expected a dccd.Body or a list of them'), ([body, 3], TypeError, r'bodies\[1\] is no dccd.Body'),
                 ([body, body], ValueError, "another body is called 'cloth', too"),
+                (dccd.Body(self.t0, self.t1, FACES, name='octomap'), ValueError, "'octomap' is the map, or the body itself; give it another name"),
+                ([dccd.Body(self.t0, self.t1, FACES, name=name, separations_m={other: distance}) for name, other, distance in (
+                    ('cloth', 'table', .6), ('table', 'cloth', .1))], ValueError, 'name two separations, 0.600000 and 0.100000 m'),
                 (dccd.Body(mesh=body.mesh), ValueError, "body 'body_0' needs 6 positions at t0 and t1, got 0 and 0")]:
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
                 dccd.detect(bodies)

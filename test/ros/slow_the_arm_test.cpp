@@ -34,16 +34,17 @@ TEST(GuardTwist, BothClientsChangeTheTwistLeastAndStandWhereNothingIsKnown) {
   ros::Publisher wanted = advertiseAndWait<geometry_msgs::TwistStamped>(node, "/wanted", false, 2);
   deformable_ccd::Limits limits;
   limits.horizon = 0.5;
-  limits.links = {"hand"};
-  limits.origins.resize(1);
-  limits.reaches = {0.1};
+  limits.links = {"hand", "hand/2"};  // of two collision elements: the second one is what is limited
+  limits.origins.resize(2);
+  limits.reaches = {0.1, 0.1};
   limits.most_speed = 2;
-  limits.link = {0};
+  limits.link = {1};
   limits.partners = {"octomap"};
   limits.corners.resize(8);
   limits.normals.resize(1);
   limits.normals[0].z = -1;
   limits.speeds = {0.2};
+  ros::Duration ahead{0};  // of the clock of who wants it
   const auto expectTwist = [&](bool renews, double down_m_s, double aside_m_s, const std::string& why) {
     EXPECT_TRUE(waitUntil([&] {
       if (renews) {
@@ -51,7 +52,7 @@ TEST(GuardTwist, BothClientsChangeTheTwistLeastAndStandWhereNothingIsKnown) {
         monitor.publish(limits);
       }
       geometry_msgs::TwistStamped asked;
-      asked.header.stamp = ros::Time::now();
+      asked.header.stamp = ros::Time::now() + ahead;
       asked.twist.linear.x = 0.3;
       asked.twist.linear.z = -1;
       wanted.publish(asked);
@@ -67,6 +68,14 @@ TEST(GuardTwist, BothClientsChangeTheTwistLeastAndStandWhereNothingIsKnown) {
   expectTwist(false, 0, 0, "the limits are old");
   limits.speeds = {2};
   expectTwist(true, 1, 0.3, "nothing limits it");
+  ahead = ros::Duration(60);
+  expectTwist(true, 0, 0, "what is wanted only in a minute");
+  ahead = ros::Duration(0);
+  limits.links[0] = "arm";
+  limits.links[1] = "arm/2";
+  expectTwist(true, 0, 0, "of the hand nothing is said");
+  limits.links[0] = "hand";
+  limits.links[1] = "hand/2";
   limits.most_speed = 0.5;
   expectTwist(true, 0.5 / std::sqrt(1.09), 0.15 / std::sqrt(1.09), "nor is it faster than all links may be");
   limits.unknown = {"nobody knows"};

@@ -193,6 +193,14 @@ def joints_that_turn_against_each_other(c):
     c.finger('finger')
 
 
+def a_finger_that_is_handed_over_around_the_end_of_a_step(c):
+    c.body('sheet', SHEET, 3, every(.1))
+    c.tf('arm', every(.04, 1.12, -.08), z=lambda t: .3)
+    c.tf('finger', [t for t in every(.04, 1.12, -.08) if t < .5], parent='arm')
+    c.tf('finger', [t for t in every(.04, 1.12, -.08) if t > .5], z=lambda t: .3)
+    c.finger('finger')
+
+
 def a_frame_between_of_which_nothing_is_known(c):
     nan = float('nan')
     c.body('sheet', SHEET, 3, every(.1))

@@ -124,6 +124,7 @@ class World:
             for kind in faults if faults is not None else [r.choice(FAULTS) for _ in range(r.choice([0, 1, 1, 2, 3]))]:
                 self.fault(kind)
         self.ahead(random.Random(seed + 2 * NS))
+        self.handed_over(random.Random(seed + 4 * NS))
         self.rows.sort(key=lambda row: row[2])
         for before, row in zip(self.rows, self.rows[1:]):  # no two at once
             row[2] = max(row[2], before[2] + 1000)
@@ -311,7 +312,7 @@ class World:
             p['phase'] = r.choice([row['phase'], ''])
 
     def otherwise(self, r):
-        """The other forms: full maps with pruned leaves, maps of files, pictures, sensors that move or are two, a frame that changes its parent, a budget."""
+        """The other forms: full maps with pruned leaves, maps of files, pictures, sensors that move or are two, a budget."""
         p = self.params
         if self.tame or r.random() < .5:
             return
@@ -325,8 +326,6 @@ class World:
         clouds = [row for row in self.rows if row[0] == '/points']
         if clouds:
             r.choice([self.pictured, self.pictured, self.carried_along, self.two])(r, clouds)
-        if len(self.chain) > 1 and r.random() < .3:
-            self.adopted(r)
         if r.random() < .1:
             p['step_budget_ms'] = r.choice([.01, .05, 100])
         if r.random() < .1:
@@ -413,12 +412,6 @@ class World:
         for row in clouds[::2]:
             row[0] = row[3] = '/others'
 
-    def adopted(self, r):
-        """From some moment on the last joint is told in the world."""
-        mine = [row for row in self.rows if row[0] == '/tf' and row[1].transforms[0].child_frame_id == self.chain[-1]]
-        for row in mine[r.randrange(len(mine)):]:
-            row[1].transforms[0].header.frame_id = 'world'
-
     def ahead(self, r):
         """Limits, what the finger carries, and twists by which it is said to go: some right, some late, some of a frame that is not there; or of a robot."""
         p = self.params
@@ -441,6 +434,18 @@ class World:
             for axis in 'xyz':
                 setattr(message.twist.linear, axis, r.choice([0, r.uniform(-.2, .2), r.uniform(-.2, .2), math.nan if r.random() < .1 else 0]))
             self.add('/collision_monitor/intended', message, at, r.uniform(0, .05))
+
+    def handed_over(self, r):
+        """A frame gets another parent, for a while or for good."""
+        if self.tame or r.random() < .8:
+            return
+        rows = [row for row in self.rows if row[0] == '/tf']
+        child = r.choice(rows)[1].transforms[0].child_frame_id
+        mine = [row[1].transforms[0] for row in rows if row[1].transforms[0].child_frame_id == child]
+        at, parent = r.randrange(len(mine)), r.choice(['world', 'mount'])
+        for one in mine[at:at + r.choice([1, 3, len(mine)])]:
+            one.header.frame_id = parent
+        self.faults.append('%s is handed over to %s at %d' % (child, parent, at))
 
     def options(self):
         r, p = self.r, self.params

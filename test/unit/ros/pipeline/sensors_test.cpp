@@ -79,6 +79,7 @@ sensor_msgs::CameraInfo infoOf() {
   out.distortion_model = "plumb_bob";
   out.D.assign(5, 0.0);
   out.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  out.K = {FOCAL_PX, 0, CENTRE_PX, 0, FOCAL_PX, CENTRE_PX, 0, 0, 1};
   out.P = {FOCAL_PX, 0, CENTRE_PX, 0, 0, FOCAL_PX, CENTRE_PX, 0, 0, 0, 1, 0};
   return out;
 }
@@ -166,6 +167,7 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
       {good, info([](auto& i) { i.D[1] = -0.2; }), "D[1] is -0.2: pictures with distortion"},
       {good, info([](auto& i) { i.R[1] = 0.02; }), "R[1] is 0.02: pictures with distortion"},
       {good, info([](auto& i) { i.R[8] = 0; }), "R[8] is 0: pictures with distortion"},
+      {good, info([](auto& i) { i.K[5] = 30; }), "K[5] is 30: pictures with distortion"},
       {good, info([](auto& i) { i.header.frame_id = "other"; }), "its frame_id is 'other', and the picture's 'camera'"},
       {good, info([](auto& i) { i.header.frame_id = ""; }), "its frame_id is '', and the picture's 'camera'"},
       {good, info([](auto& i) { i.P[0] = 0; }), "is no pinhole's projection"},
@@ -195,7 +197,7 @@ TEST(Sensors, APictureThatCannotBeReadIsRefusedByName) {
 sensor_msgs::CameraInfo infoAt(double stamp_s, double focal_px = FOCAL_PX) {
   sensor_msgs::CameraInfo out = infoOf();
   out.header.stamp = ros::Time(stamp_s);
-  out.P[0] = out.P[5] = focal_px;
+  out.P[0] = out.P[5] = out.K[0] = out.K[4] = focal_px;
   return out;
 }
 

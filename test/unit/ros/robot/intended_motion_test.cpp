@@ -6,6 +6,7 @@
 #include "output/safe_until_messages.h"
 #include "panda.h"
 #include "robot/joint_tree.h"
+#include "robot/urdf_text.h"
 #include "robot_scene.h"
 #include "robot_texts.h"
 
@@ -59,6 +60,18 @@ TEST(JointTree, IsWhereOtherKinematicsHasTheLinks) {
   }
   EXPECT_FALSE(tree.moves("panda_finger_joint2")) << "it follows the other finger";
   EXPECT_EQ(tree.jointsTo("panda_leftfinger"), tree.jointsTo("panda_rightfinger"));
+}
+
+// Whatever moves the first would move the last, and nobody could name that.
+TEST(JointTree, ARobotOfWhichAJointFollowsAFollowerIsRefused) {
+  const auto following = [](const std::string& leader) {
+    const std::string limit = "<limit lower='-2' upper='2' effort='1' velocity='1'/>";
+    return robotOf(link("a", "") + link("b", "") + link("c", "") + link("d", "") + joint("a", "b", "revolute", limit) +
+                   joint("a", "c", "revolute", limit + "<mimic joint='a_b'/>") +
+                   joint("a", "d", "revolute", limit + "<mimic joint='" + leader + "'/>"));
+  };
+  EXPECT_EQ(JointTree(following("a_b")).jointsTo("d"), std::set<std::string>{"a_b"});
+  for (const char* leader : {"a_c", "a_d", "a_x"}) EXPECT_THROW(JointTree{following(leader)}, RobotTextError) << leader;
 }
 
 TEST(JointTree, NoVertexHasMoreAccelerationThanItsBound) {

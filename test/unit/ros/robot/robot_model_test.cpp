@@ -98,15 +98,17 @@ TEST_F(RobotModel, EveryGeometryIsWhereTheLinkHasIt) {
   }
 }
 
-TEST_F(RobotModel, ScaleIsAboutTheLinksOriginAndTheToleranceIsThatOfTheResult) {
+// About the link's origin it would take the element away from where it is.
+TEST_F(RobotModel, ScaleIsAboutTheElementsMiddleAndTheToleranceIsThatOfTheResult) {
   const std::string urdf = robotOf(link("a", collision("<box size='2 2 2'/>", "<origin xyz='3 0 0'/>")) +
                                    link("b", collision("<cylinder radius='0.5' length='2'/>")) + joint("a", "b"));
   RobotConfig config;
   config.scale = 0.5;
   config.links["b"].scale = 4.0;
   const Robot robot = robotFrom(urdf, "", config);
-  EXPECT_TRUE(hasVertex(partOf(robot, "a"), Vec3(2, 0.5, 0.5), 0));
-  EXPECT_TRUE(hasVertex(partOf(robot, "a"), Vec3(1, -0.5, 0.5), 0));
+  EXPECT_TRUE(hasVertex(partOf(robot, "a"), Vec3(3.5, 0.5, 0.5), 0));
+  EXPECT_TRUE(hasVertex(partOf(robot, "a"), Vec3(2.5, -0.5, 0.5), 0));
+  EXPECT_EQ(robot.excluded, std::vector<std::string>{"link 'a' but for a scale of 0.5"});
   EXPECT_EQ(partOf(robot, "b").mesh->positions.size(), 2 * 100u) << "a radius of 2 m within 1 mm";
 }
 
