@@ -82,6 +82,7 @@ HWY_AFTER_NAMESPACE();
 #include "simd/exact_batch_reject-inl.h"
 #include "simd/exact_batch_roots-inl.h"
 #include "simd/exact_batch_sharpen-inl.h"
+#include "simd/exact_batch_direct-inl.h"
 #include "simd/exact_batch_subdivide-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -118,7 +118,7 @@ HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
 /// One vector, intervals from left to right: each is proved free (no root, or the features apart), or holds one root,
 /// which is refined, or is halved. Stops at the first certain contact.
 template <BatchKind KIND>
-HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
+HWY_INLINE void subdivideVector(HardBlock& pairs, std::size_t i, double cells) {
   const Tag d;
   const V one = constant(1), zero = hn::Zero(d), third = constant(1.0 / 3), half = constant(0.5);
   const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
@@ -140,16 +140,18 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
       store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
       approximate<false, PATIENT_STEPS>(pairs, i);
       certify<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
-      const V outcome = load(pairs.outcome, i);
+      const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
+      const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
+      V outcome = load(pairs.outcome, i);
+      const M open = hn::And(narrow, hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN))));
+      if (!hn::AllFalse(d, open)) outcome = choose(open, directedOutcome<KIND>(pairs, i, lo, hi, cells), outcome);
       const M contact =
           hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
       free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
       result = choose(contact, outcome, result);
       const M uncertain = hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
-      const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
       if (!hn::AllFalse(d, uncertain)) free = hn::Or(free, hn::And(uncertain, apart<KIND>(pairs, i, lo, hi)));
       // What stays uncertain in a narrow bracket stays so in every interval around it.
-      const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
       const M stuck = hn::And(hn::AndNot(free, uncertain), narrow);
       result = choose(stuck, constant(ROOT_UNCERTAIN), result);
       kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);

@@ -1,0 +1,126 @@
+// The inside test at a root where edges are parallel but for rounding, or a face is a line: see exact_batch-inl.h, which
+// includes this.
+//
+// There all components of u x v are about as large as the error of doubles. Those of w x v and w x u are, too, and these
+// change fast: layers that slide in a plane pass over each other. What is seen along a direction d does not: where d is
+// across the change of w x v, that is 0 to the last digits, and only the heights of the edges above each other count. Any
+// d is safe. A contact at a root is s u = w + r v (EE), or w = s u + r v (VF), so n = u x v, B = w x v and C = w x u
+// (EE), u x w (VF) are n, s n and r n, and the products of these vectors with d are q, s q and r q. Two of opposite signs
+// out of insideTest()'s exclude a contact; where all have one sign, q is not 0, and the features meet.
+//
+// Rounding, in the notation of exact_batch_bounds.h; |d| is the sum of d's components. Values, from pairs of doubles:
+//   x(m) = s D0 + t D1: 8 eps^2 X for both products, 7 for the sum; |x(m)| <= X, its trailing part at most eps X;
+//   a minor: 30 eps^2 X Y as above, 2 * 2 * 15 from x(m), y(m): 90, and |q_k| <= 2 X Y;
+//   a product with d: 90 + 8 * 2, and 28 for two sums: 134 eps^2 X Y |d|; a sum of three of these at most 200 of each.
+// Changes, |x1 - x0| <= 2 X, in doubles: a product 8 eps X Y, four of them 32, sums of them 16, the product with d 24:
+// 72 eps X Y |d|. The second derivative is at most 16 X Y |d|. So within h of m a value is off by at most h |q'| +
+// (8 h^2 + 72 eps h + 200 eps^2) X Y |d|; 8 (h + 2^-48)^2 is used, 8 h^2 + 512 eps h + 8192 eps^2, which covers the
+// bound's own rounding. QUADRATIC_UNDERFLOW covers what underflows, where d is tiny.
+HWY_BEFORE_NAMESPACE();
+namespace dccd {
+namespace simd {
+namespace HWY_NAMESPACE {
+
+/// A component of a difference at the time in question, and by how much it changes over the step.
+struct Moving {
+  Factor at;
+  V change;
+};
+
+/// A vector at that time in pairs of doubles, and its derivative.
+struct MovingVector {
+  Twofold at[3];
+  V slope[3];
+};
+
+HWY_INLINE MovingVector crossOf(const Moving (&x)[3], const Moving (&y)[3]) {
+  MovingVector result;
+  for (int k = 0; k < 3; ++k) {
+    const int p = k == 2 ? 0 : k + 1, q = k == 0 ? 2 : k - 1;
+    result.at[k] = minor(x[p].at, y[q].at, x[q].at, y[p].at);
+    result.slope[k] = hn::Add(minor(x[p].change, y[q].at.value.hi, x[q].change, y[p].at.value.hi),
+                              minor(x[p].at.value.hi, y[q].change, x[q].at.value.hi, y[p].change));
+  }
+  return result;
+}
+
+HWY_INLINE MovingVector difference(const MovingVector& a, const MovingVector& b) {
+  MovingVector result;
+  for (int k = 0; k < 3; ++k) {
+    result.at[k] = sum(a.at[k], negative(b.at[k]));
+    result.slope[k] = hn::Sub(a.slope[k], b.slope[k]);
+  }
+  return result;
+}
+
+HWY_INLINE V dot(const V (&a)[3], const V (&b)[3]) { return dot(a[0], a[1], a[2], b[0], b[1], b[2]); }
+
+/// q d, and where it is certainly not 0, nor of another sign within h.
+HWY_INLINE V along(const MovingVector& q, const V (&d)[3], V h, V slack, M& certain) {
+  const V zero = hn::Zero(Tag());
+  Twofold value = product(Factor(q.at[0]), Factor({d[0], zero}));
+  for (int k = 1; k < 3; ++k) value = sum(value, product(Factor(q.at[k]), Factor({d[k], zero})));
+  const V error = hn::Add(hn::Mul(h, hn::Abs(dot(q.slope, d))), hn::Add(slack, constant(tolerance::QUADRATIC_UNDERFLOW)));
+  certain = hn::And(certain, hn::Gt(hn::Abs(value.hi), error));
+  return value.hi;
+}
+
+/// Lanes that certainly touch at every t within h of m, a multiple of 2^-52, at which f is 0; and that certainly do not.
+template <BatchKind KIND>
+HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V h, M& touches, M& misses) {
+  constexpr bool VF = KIND == BatchKind::VERTEX_FACE;
+  const V zero = hn::Zero(Tag());
+  const Factor before({hn::Sub(constant(1), m), zero}), after({m, zero});
+  Moving u[3], v[3], w[3];
+  const auto set = [&](int plane, Moving(&to)[3]) HWY_ATTR {
+    for (int k = plane; k < plane + 3; ++k) {
+      const V start = load(pairs.motion[k], i), end = load(pairs.motion[U_T1 + k], i);
+      const Factor x0({start, load(pairs.rest.motion[k], i)}), x1({end, load(pairs.rest.motion[U_T1 + k], i)});
+      to[k - plane] = {Factor(sum(product(x0, before), product(x1, after))), hn::Sub(end, start)};
+    }
+  };
+  set(U_T0, u), set(V_T0, v), set(W_T0, w);
+  const MovingVector n = crossOf(u, v), b = crossOf(w, v), c = VF ? crossOf(u, w) : crossOf(w, u);
+  const V n_hi[3] = {n.at[0].hi, n.at[1].hi, n.at[2].hi};
+  const V size_u = load(pairs.size[0], i), size_v = load(pairs.size[1], i), size_w = load(pairs.size[2], i);
+  const V size_n = hn::Mul(size_u, size_v), size_b = hn::Mul(size_v, size_w), size_c = hn::Mul(size_u, size_w);
+  const V wider = hn::Add(h, constant(0x1p-48)), relative = hn::Mul(constant(8), hn::Mul(wider, wider));
+  touches = hn::FirstN(Tag(), lanes()), misses = hn::FirstN(Tag(), 0);
+  const auto take = [&](const MovingVector& q, V size_q) HWY_ATTR {
+    const V share = hn::Div(dot(q.slope, n_hi), dot(q.slope, q.slope));
+    V d[3], length = zero;
+    for (int k = 0; k < 3; ++k) {
+      d[k] = hn::Sub(n_hi[k], hn::Mul(q.slope[k], share));
+      length = hn::Add(length, hn::Abs(d[k]));
+    }
+    const V slack = hn::Mul(length, relative);
+    M certain = hn::FirstN(Tag(), lanes());
+    const V one = along(n, d, h, hn::Mul(slack, size_n), certain), other = along(q, d, h, hn::Mul(slack, size_q), certain);
+    const M opposite = hn::Xor(hn::Gt(one, zero), hn::Gt(other, zero));
+    touches = hn::And(touches, hn::AndNot(opposite, certain));
+    misses = hn::Or(misses, hn::And(opposite, certain));
+  };
+  take(b, size_b), take(c, size_c);
+  if (VF) {
+    take(difference(difference(n, b), c), hn::Add(hn::Add(size_n, size_b), size_c));
+  } else {
+    take(difference(n, b), hn::Add(size_n, size_b)), take(difference(n, c), hn::Add(size_n, size_c));
+  }
+}
+
+/// What the test above says of the root in (lo, hi), which are multiples of 2^-52: ROOT_*.
+template <BatchKind KIND>
+HWY_INLINE V directedOutcome(const HardBlock& pairs, std::size_t i, V lo, V hi, double cells) {
+  const V middle = onGrid(hn::Mul(constant(0.5), hn::Add(lo, hi)));
+  M touches, misses;
+  directedInsideTest<KIND>(pairs, i, middle, hn::Max(hn::Sub(middle, lo), hn::Sub(hi, middle)), touches, misses);
+  const V end_of_cell = hn::Add(floorOf(hn::Mul(lo, constant(cells))), constant(1));
+  const M in_one_cell = hn::Le(hn::Mul(hi, constant(cells)), end_of_cell);
+  const V contact = choose(in_one_cell, constant(ROOT_CONTACT), constant(ROOT_CONTACT_NO_CELL));
+  return choose(misses, constant(ROOT_NO_CONTACT), choose(touches, contact, constant(ROOT_UNCERTAIN)));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace simd
+}  // namespace dccd
+HWY_AFTER_NAMESPACE();
