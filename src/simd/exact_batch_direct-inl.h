@@ -108,16 +108,19 @@ HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V
   }
 }
 
-/// What the test above says of the root in (lo, hi), which are multiples of 2^-52: ROOT_*.
+/// Asks the test above about one vector of certified brackets, in lanes that certify() left uncertain. Of lanes without a
+/// bracket the outcome means nothing then.
 template <BatchKind KIND>
-HWY_INLINE V directedOutcome(const HardBlock& pairs, std::size_t i, V lo, V hi, double cells) {
+HWY_NOINLINE void settleDirected(HardBlock& pairs, std::size_t i, double cells) {
+  const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i), outcome = load(pairs.outcome, i);
   const V middle = onGrid(hn::Mul(constant(0.5), hn::Add(lo, hi)));
   M touches, misses;
   directedInsideTest<KIND>(pairs, i, middle, hn::Max(hn::Sub(middle, lo), hn::Sub(hi, middle)), touches, misses);
   const V end_of_cell = hn::Add(floorOf(hn::Mul(lo, constant(cells))), constant(1));
   const M in_one_cell = hn::Le(hn::Mul(hi, constant(cells)), end_of_cell);
   const V contact = choose(in_one_cell, constant(ROOT_CONTACT), constant(ROOT_CONTACT_NO_CELL));
-  return choose(misses, constant(ROOT_NO_CONTACT), choose(touches, contact, constant(ROOT_UNCERTAIN)));
+  const V settled = choose(misses, constant(ROOT_NO_CONTACT), choose(touches, contact, outcome));
+  store(choose(hn::Eq(outcome, constant(ROOT_UNCERTAIN)), settled, outcome), pairs.outcome, i);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -143,8 +143,11 @@ HWY_INLINE void subdivideVector(HardBlock& pairs, std::size_t i, double cells) {
       const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
       const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
       V outcome = load(pairs.outcome, i);
-      const M open = hn::And(narrow, hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN))));
-      if (!hn::AllFalse(d, open)) outcome = choose(open, directedOutcome<KIND>(pairs, i, lo, hi, cells), outcome);
+      const M open = hn::And(hn::And(has_root, narrow), hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
+      if (!hn::AllFalse(d, open)) {
+        settleDirected<KIND>(pairs, i, cells);
+        outcome = choose(open, load(pairs.outcome, i), outcome);
+      }
       const M contact =
           hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
       free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));

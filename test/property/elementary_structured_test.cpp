@@ -138,7 +138,7 @@ TEST(ElementaryStructured, WhatNearlyMeetsAnEdgeIsTheIntegers) {
     }
     std::cerr << settled << ' ' << contacts << '\n';
     EXPECT_GT(settled, count * 7 / 10) << toString(kind);
-    EXPECT_GT(contacts, count / 10) << toString(kind);
+    EXPECT_GT(contacts, count / 20) << toString(kind);
   }
 }
 
