@@ -101,7 +101,8 @@ HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
 }
 
 /// Where subdivision ends. An interval at an end of the step at which f is uncertain can only be free because the
-/// features are apart there, which wide intervals show as well; for features at rest all intervals are alike.
+/// features are apart there, which wide intervals show as well; where it is uncertain at both ends, wider ones. For
+/// features at rest all intervals are alike.
 HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
   const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
   M rests = hn::FirstN(Tag(), lanes());
@@ -110,9 +111,10 @@ HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
     rests = hn::And(rests, hn::Eq(load(pairs.motion[V_T0 + k], i), load(pairs.motion[V_T1 + k], i)));
     rests = hn::And(rests, hn::Eq(load(pairs.motion[W_T0 + k], i), load(pairs.motion[W_T1 + k], i)));
   }
-  const M uncertain = hn::Or(hn::Le(hn::Abs(f0), error), hn::Le(hn::Abs(f3), error));
-  return choose(rests, constant(1),
-                choose(uncertain, constant(SMALLEST_INTERVAL_AT_ENDS), constant(SMALLEST_INTERVAL)));
+  const M at_start = hn::Le(hn::Abs(f0), error), at_end = hn::Le(hn::Abs(f3), error);
+  const V one_end = choose(hn::Or(at_start, at_end), constant(SMALLEST_INTERVAL_AT_ENDS * SMALLEST_INTERVAL_AT_ENDS),
+                           constant(SMALLEST_INTERVAL));
+  return choose(rests, constant(1), choose(hn::And(at_start, at_end), constant(SMALLEST_INTERVAL_AT_ENDS), one_end));
 }
 
 /// One vector, intervals from left to right: each is proved free (no root, or the features apart), or holds one root,

@@ -61,9 +61,8 @@ TEST(ElementaryStructured, FewWordsAreEnough) {
                          exact::decideByDoubleDouble(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
       ++(known ? settled : left);
     }
-    std::cerr << set.family << left << ' ' << settled << '\n';
-    EXPECT_LE(left, settled / 20)
-        << set.family << ", " << toString(set.kind) << ": " << left << " of " << set.pairs.size() << " pairs need more";
+    EXPECT_LE(left, settled / 20) << set.family << ", " << toString(set.kind) << ": " << left << " of "
+                                  << set.pairs.size() << " pairs need more";
   }
 }
 
@@ -86,16 +85,14 @@ TEST(ElementaryStructured, TheBatchIsEnoughInAPlaneAlongNoAxis) {
       ASSERT_EQ(batch.verdict, exact.verdict) << set.family << ", pair " << i;
       ASSERT_EQ(batch.toc_lower, exact.toc_lower) << set.family << ", pair " << i;
     }
-    std::cerr << set.family << settled << ' ' << set.pairs.size() << '\n';
-    EXPECT_GE(settled, set.pairs.size() * 99 / 100)
-        << set.family << ", " << toString(set.kind);
+    EXPECT_GE(settled, set.pairs.size() * 99 / 100) << set.family << ", " << toString(set.kind);
     EXPECT_GT(contacts, set.pairs.size() / 100) << set.family << ", " << toString(set.kind);
   }
   EXPECT_EQ(sets, 4);
 }
 
-/// Points of a lattice that lie in a plane, or on a line, at a time between, with some last bits changed: a vertex comes
-/// over an edge or a vertex, edges come to lie on one line, or very nearly so.
+/// Points of a lattice that lie in a plane, or on a line, at a time between, with some last bits changed: a vertex
+/// comes over an edge or a vertex, edges come to lie on one line, or very nearly so.
 PairMotion nearlyMeeting(RandomSource& random) {
   const auto draw = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
   constexpr double BASIS[3][3] = {{3, 1, -2}, {1, -4, 2}, {2, 3, 5}};
@@ -136,7 +133,6 @@ TEST(ElementaryStructured, WhatNearlyMeetsAnEdgeIsTheIntegers) {
       ASSERT_EQ(batch.verdict, exact.verdict) << toString(kind) << ", pair " << i;
       ASSERT_EQ(batch.toc_lower, exact.toc_lower) << toString(kind) << ", pair " << i;
     }
-    std::cerr << settled << ' ' << contacts << '\n';
     EXPECT_GT(settled, count * 7 / 10) << toString(kind);
     EXPECT_GT(contacts, count / 20) << toString(kind);
   }

@@ -1,21 +1,22 @@
-// The inside test at a root where edges are parallel but for rounding, or a face is a line: see exact_batch-inl.h, which
-// includes this.
+// The inside test where a root's bracket leaves the other one open: see exact_batch-inl.h, which includes this. A
+// vertex comes over an edge to the last digits, or edges are parallel but for rounding and come to lie on one line:
+// layers that slide in a plane. What is uncertain there, and changes as fast as ever, is 0 at the root but for 2^-53.
 //
-// There all components of u x v are about as large as the error of doubles. Those of w x v and w x u are, too, and these
-// change fast: layers that slide in a plane pass over each other. What is seen along a direction d does not: where d is
-// across the change of w x v, that is 0 to the last digits, and only the heights of the edges above each other count. Any
-// d is safe. A contact at a root is s u = w + r v (EE), or w = s u + r v (VF), so n = u x v, B = w x v and C = w x u
-// (EE), u x w (VF) are n, s n and r n, and the products of these vectors with d are q, s q and r q. Two of opposite signs
-// out of insideTest()'s exclude a contact; where all have one sign, q is not 0, and the features meet.
+// Along a direction d across its change it hardly changes, and pairs of doubles tell its sign. A contact at a root is s
+// u = w + r v (EE), or w = s u + r v (VF). With n = u x v, B = w x v, and C = w x u (EE), u x w (VF) that means B = s n
+// and C = r n. So for any d the features are apart where one of B, C, n-B, n-C (EE), n-B-C (VF) has another sign along
+// d than n; and they meet where for each of these there is a d along which it certainly has that of n.
 //
-// Rounding, in the notation of exact_batch_bounds.h; |d| is the sum of d's components. Values, from pairs of doubles:
-//   x(m) = s D0 + t D1: 8 eps^2 X for both products, 7 for the sum; |x(m)| <= X, its trailing part at most eps X;
-//   a minor: 30 eps^2 X Y as above, 2 * 2 * 15 from x(m), y(m): 90, and |q_k| <= 2 X Y;
-//   a product with d: 90 + 8 * 2, and 28 for two sums: 134 eps^2 X Y |d|; a sum of three of these at most 200 of each.
-// Changes, |x1 - x0| <= 2 X, in doubles: a product 8 eps X Y, four of them 32, sums of them 16, the product with d 24:
-// 72 eps X Y |d|. The second derivative is at most 16 X Y |d|. So within h of m a value is off by at most h |q'| +
-// (8 h^2 + 72 eps h + 200 eps^2) X Y |d|; 8 (h + 2^-48)^2 is used, 8 h^2 + 512 eps h + 8192 eps^2, which covers the
-// bound's own rounding. QUADRATIC_UNDERFLOW covers what underflows, where d is tiny.
+// Rounding, in the notation of exact_batch_bounds.h; |d| is the sum of d's components, XY of n - B the sum of both, and
+// so on. Values, from pairs of doubles:
+//   x(m) = s D0 + t D1: 8 eps^2 X for both products, 7 for their sum; |x(m)| <= X, its trailing part at most eps X;
+//   a minor: 30 eps^2 X Y as for n0, 2 * 2 * 15 from x(m) and y(m); sums of three: 12 more; |q| <= 2 X Y;
+//   a product with d: 102 + 2 * 8, and 2 * 14 for sums: 146 eps^2 X Y |d|.
+// Changes, |x1 - x0| <= 2 X, in doubles: a product 8 eps X Y, of which there are four; sums of them 16, of three
+// vectors 16, the product with d 24: 88 eps X Y |d|; |q'| <= 8 X Y. The second derivative is at most 16 X Y |d|. So
+// within h of m a value is off by at most h |q'| + (8 h^2 + 88 eps h + 146 eps^2) X Y |d|. 8 (h + BATCH_SHARP)^2 is
+// used, 8 h^2 + 512 eps h + 8192 eps^2: it covers the rounding of the bound, and what underflows before the product
+// with d; QUADRATIC_UNDERFLOW covers the rest. Where nothing changes d is no number, and nothing is certain.
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
 namespace simd {
@@ -60,12 +61,14 @@ HWY_INLINE V along(const MovingVector& q, const V (&d)[3], V h, V slack, M& cert
   const V zero = hn::Zero(Tag());
   Twofold value = product(Factor(q.at[0]), Factor({d[0], zero}));
   for (int k = 1; k < 3; ++k) value = sum(value, product(Factor(q.at[k]), Factor({d[k], zero})));
-  const V error = hn::Add(hn::Mul(h, hn::Abs(dot(q.slope, d))), hn::Add(slack, constant(tolerance::QUADRATIC_UNDERFLOW)));
+  const V error =
+      hn::Add(hn::Mul(h, hn::Abs(dot(q.slope, d))), hn::Add(slack, constant(tolerance::QUADRATIC_UNDERFLOW)));
   certain = hn::And(certain, hn::Gt(hn::Abs(value.hi), error));
   return value.hi;
 }
 
-/// Lanes that certainly touch at every t within h of m, a multiple of 2^-52, at which f is 0; and that certainly do not.
+/// Lanes that certainly touch at every t within h of m, a multiple of 2^-52, at which f is 0; and that certainly do
+/// not.
 template <BatchKind KIND>
 HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V h, M& touches, M& misses) {
   constexpr bool VF = KIND == BatchKind::VERTEX_FACE;
@@ -84,7 +87,7 @@ HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V
   const V n_hi[3] = {n.at[0].hi, n.at[1].hi, n.at[2].hi};
   const V size_u = load(pairs.size[0], i), size_v = load(pairs.size[1], i), size_w = load(pairs.size[2], i);
   const V size_n = hn::Mul(size_u, size_v), size_b = hn::Mul(size_v, size_w), size_c = hn::Mul(size_u, size_w);
-  const V wider = hn::Add(h, constant(0x1p-48)), relative = hn::Mul(constant(8), hn::Mul(wider, wider));
+  const V wider = hn::Add(h, constant(BATCH_SHARP)), relative = hn::Mul(constant(8), hn::Mul(wider, wider));
   touches = hn::FirstN(Tag(), lanes()), misses = hn::FirstN(Tag(), 0);
   const auto take = [&](const MovingVector& q, V size_q) HWY_ATTR {
     const V share = hn::Div(dot(q.slope, n_hi), dot(q.slope, q.slope));
@@ -95,7 +98,8 @@ HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V
     }
     const V slack = hn::Mul(length, relative);
     M certain = hn::FirstN(Tag(), lanes());
-    const V one = along(n, d, h, hn::Mul(slack, size_n), certain), other = along(q, d, h, hn::Mul(slack, size_q), certain);
+    const V one = along(n, d, h, hn::Mul(slack, size_n), certain),
+            other = along(q, d, h, hn::Mul(slack, size_q), certain);
     const M opposite = hn::Xor(hn::Gt(one, zero), hn::Gt(other, zero));
     touches = hn::And(touches, hn::AndNot(opposite, certain));
     misses = hn::Or(misses, hn::And(opposite, certain));
@@ -108,8 +112,8 @@ HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V
   }
 }
 
-/// Asks the test above about one vector of certified brackets, in lanes that certify() left uncertain. Of lanes without a
-/// bracket the outcome means nothing then.
+/// Asks the test above about one vector of certified brackets, in lanes that certify() left uncertain. Of lanes without
+/// a bracket the outcome means nothing then.
 template <BatchKind KIND>
 HWY_NOINLINE void settleDirected(HardBlock& pairs, std::size_t i, double cells) {
   const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i), outcome = load(pairs.outcome, i);
