@@ -17,6 +17,11 @@
 // within h of m a value is off by at most h |q'| + (8 h^2 + 88 eps h + 146 eps^2) X Y |d|. 8 (h + BATCH_SHARP)^2 is
 // used, 8 h^2 + 512 eps h + 8192 eps^2: it covers the rounding of the bound, and what underflows before the product
 // with d; QUADRATIC_UNDERFLOW covers the rest. Where nothing changes d is no number, and nothing is certain.
+//
+// Of edges that stay parallel to the last digits, and in a plane, f tells nothing: it is 0. They are apart where B and
+// n - B have opposite signs along some d all the while, as both are s n and (1 - s) n: where all Bernstein coefficients
+// have. These are off by at most 72 eps^2 X Y, as above, and 24 for n - B; at most 4 X Y; so along d, a pair of
+// doubles, by 72 + 24 + 8 * 4 + 2 * 28 = 184 eps^2 X Y |d|. BATCH_SHARP_VALUE is 4096 eps^2.
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
 namespace simd {
@@ -125,6 +130,65 @@ HWY_NOINLINE void settleDirected(HardBlock& pairs, std::size_t i, double cells) 
   const V contact = choose(in_one_cell, constant(ROOT_CONTACT), constant(ROOT_CONTACT_NO_CELL));
   const V settled = choose(misses, constant(ROOT_NO_CONTACT), choose(touches, contact, outcome));
   store(choose(hn::Eq(outcome, constant(ROOT_UNCERTAIN)), settled, outcome), pairs.outcome, i);
+}
+
+/// Coefficients of x x y over the step in pairs of doubles: at t = 0, twice the middle one, at t = 1.
+HWY_INLINE void crossCoefficients(const Factor (&x)[2][3], const Factor (&y)[2][3], Twofold (&q)[3][3]) {
+  for (int k = 0; k < 3; ++k) {
+    const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
+    q[0][k] = minor(x[0][i], y[0][j], x[0][j], y[0][i]);
+    q[1][k] = sum(minor(x[0][i], y[1][j], x[0][j], y[1][i]), minor(x[1][i], y[0][j], x[1][j], y[0][i]));
+    q[2][k] = minor(x[1][i], y[1][j], x[1][j], y[1][i]);
+  }
+}
+
+HWY_INLINE Twofold dotOf(const Twofold (&a)[3], const Twofold (&b)[3]) {
+  const Twofold two = sum(product(Factor(a[0]), Factor(b[0])), product(Factor(a[1]), Factor(b[1])));
+  return sum(two, product(Factor(a[2]), Factor(b[2])));
+}
+
+/// Settles the lanes that are still uncertain whose edges are certainly apart. What is across the change of B to the
+/// digits of a double alone would still change more than the heights of the edges above each other.
+HWY_NOINLINE void settleParallel(HardBlock& pairs, std::size_t i) {
+  const V zero = hn::Zero(Tag());
+  Factor u[2][3], v[2][3], w[2][3];
+  const auto set = [&](int plane, Factor(&to)[2][3]) HWY_ATTR {
+    for (int k = 0; k < 3; ++k) {
+      for (int end = 0; end < 2; ++end) {
+        const int at = plane + k + (end == 0 ? 0 : U_T1);
+        to[end][k] = Factor({load(pairs.motion[at], i), load(pairs.rest.motion[at], i)});
+      }
+    }
+  };
+  set(U_T0, u), set(V_T0, v), set(W_T0, w);
+  Twofold n[3][3], b[3][3], d[3];
+  crossCoefficients(u, v, n), crossCoefficients(w, v, b);
+  Twofold slope[3];
+  for (int k = 0; k < 3; ++k) {
+    d[k] = sum(sum(b[0][k], b[2][k]), b[1][k]);
+    slope[k] = sum(b[2][k], negative(b[0][k]));
+  }
+  const V square = dot(slope[0].hi, slope[1].hi, slope[2].hi, slope[0].hi, slope[1].hi, slope[2].hi);
+  for (int pass = 0; pass < 3; ++pass) {  // each takes the share that is left to 2^-53 of it
+    const V share = hn::Div(hn::Neg(dotOf(slope, d).hi), square);
+    for (int k = 0; k < 3; ++k) d[k] = sum(d[k], product(Factor(slope[k]), Factor({share, zero})));
+  }
+  V length = zero;
+  for (int k = 0; k < 3; ++k) length = hn::Add(length, hn::Abs(d[k].hi));
+  const V size_v = load(pairs.size[1], i), sizes = hn::Add(load(pairs.size[0], i), load(pairs.size[2], i));
+  const V error = hn::Add(hn::Mul(hn::Mul(constant(BATCH_SHARP_VALUE), length), hn::Mul(size_v, sizes)),
+                          constant(tolerance::QUADRATIC_UNDERFLOW));
+  M above = hn::FirstN(Tag(), lanes()), below = above;
+  for (int c = 0; c < 3; ++c) {
+    Twofold rest[3];
+    for (int k = 0; k < 3; ++k) rest[k] = sum(n[c][k], negative(b[c][k]));
+    const Twofold one = dotOf(b[c], d), other = dotOf(rest, d);
+    above = hn::And(above, hn::And(hn::Gt(one.hi, error), hn::Lt(other.hi, hn::Neg(error))));
+    below = hn::And(below, hn::And(hn::Lt(one.hi, hn::Neg(error)), hn::Gt(other.hi, error)));
+  }
+  const V outcome = load(pairs.outcome, i);
+  const M apart = hn::And(hn::Or(above, below), hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
+  store(choose(apart, constant(ROOT_NO_CONTACT), outcome), pairs.outcome, i);
 }
 
 }  // namespace HWY_NAMESPACE

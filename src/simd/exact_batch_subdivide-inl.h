@@ -171,7 +171,10 @@ HWY_INLINE void subdivideVector(HardBlock& pairs, std::size_t i, double cells) {
     result = choose(hn::And(hn::Eq(result, constant(ROOT_PENDING)), hn::Lt(width, smallest)), constant(ROOT_UNCERTAIN),
                     result);
   }
-  store(choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result), pairs.outcome, i);
+  result = choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result);
+  store(result, pairs.outcome, i);
+  const bool edges = KIND == BatchKind::EDGE_EDGE;
+  if (edges && !hn::AllFalse(d, hn::Eq(result, constant(ROOT_UNCERTAIN)))) settleParallel(pairs, i);
   store(kept_lo, pairs.root_lo, i);
   store(kept_hi, pairs.root_hi, i);
 }
