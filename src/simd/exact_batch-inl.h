@@ -4,7 +4,8 @@
 //   roots (exact_batch_roots-inl.h)          pieces with one root each; of each root (exact_batch_refine-inl.h) a few
 //                                            Halley steps, a bracket certified by signs, the inside test over it;
 //   sharpen (exact_batch_sharpen-inl.h)      of what this leaves undecided f anew, in pairs of doubles;
-//   subdivide (exact_batch_subdivide-inl.h)  these pairs by intervals from left to right.
+//   subdivide (exact_batch_subdivide-inl.h)  these pairs by intervals from left to right;
+//   sight (exact_batch_sight-inl.h)          the inside test at their roots along directions of its own.
 // With CERTIFIED false all bounds are zero and nothing is certified; the rest is the same.
 // No MulAdd, no reciprocal estimate: every target computes the same bits.
 #include "simd/exact_batch.h"
@@ -82,6 +83,7 @@ HWY_AFTER_NAMESPACE();
 #include "simd/exact_batch_reject-inl.h"
 #include "simd/exact_batch_roots-inl.h"
 #include "simd/exact_batch_sharpen-inl.h"
+#include "simd/exact_batch_sight-inl.h"
 #include "simd/exact_batch_subdivide-inl.h"
 
 HWY_BEFORE_NAMESPACE();

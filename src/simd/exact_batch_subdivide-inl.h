@@ -101,7 +101,8 @@ HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
 }
 
 /// Where subdivision ends. An interval at an end of the step at which f is uncertain can only be free because the
-/// features are apart there, which wide intervals show as well; for features at rest all intervals are alike.
+/// features are apart there, which wide intervals show as well; where it is uncertain at both ends, wider ones. For
+/// features at rest all intervals are alike.
 HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
   const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
   M rests = hn::FirstN(Tag(), lanes());
@@ -110,15 +111,16 @@ HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
     rests = hn::And(rests, hn::Eq(load(pairs.motion[V_T0 + k], i), load(pairs.motion[V_T1 + k], i)));
     rests = hn::And(rests, hn::Eq(load(pairs.motion[W_T0 + k], i), load(pairs.motion[W_T1 + k], i)));
   }
-  const M uncertain = hn::Or(hn::Le(hn::Abs(f0), error), hn::Le(hn::Abs(f3), error));
-  return choose(rests, constant(1),
-                choose(uncertain, constant(SMALLEST_INTERVAL_AT_ENDS), constant(SMALLEST_INTERVAL)));
+  const M at_start = hn::Le(hn::Abs(f0), error), at_end = hn::Le(hn::Abs(f3), error);
+  const V one_end = choose(hn::Or(at_start, at_end), constant(SMALLEST_INTERVAL_AT_ENDS * SMALLEST_INTERVAL_AT_ENDS),
+                           constant(SMALLEST_INTERVAL));
+  return choose(rests, constant(1), choose(hn::And(at_start, at_end), constant(SMALLEST_INTERVAL_AT_ENDS), one_end));
 }
 
 /// One vector, intervals from left to right: each is proved free (no root, or the features apart), or holds one root,
 /// which is refined, or is halved. Stops at the first certain contact.
 template <BatchKind KIND>
-HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
+HWY_INLINE void subdivideVector(HardBlock& pairs, std::size_t i, double cells) {
   const Tag d;
   const V one = constant(1), zero = hn::Zero(d), third = constant(1.0 / 3), half = constant(0.5);
   const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
@@ -140,16 +142,21 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
       store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
       approximate<false, PATIENT_STEPS>(pairs, i);
       certify<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
-      const V outcome = load(pairs.outcome, i);
+      const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
+      const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
+      V outcome = load(pairs.outcome, i);
+      const M open = hn::And(hn::And(has_root, narrow), hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
+      if (!hn::AllFalse(d, open)) {
+        settleDirected<KIND>(pairs, i, cells);
+        outcome = choose(open, load(pairs.outcome, i), outcome);
+      }
       const M contact =
           hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
       free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
       result = choose(contact, outcome, result);
       const M uncertain = hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
-      const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
       if (!hn::AllFalse(d, uncertain)) free = hn::Or(free, hn::And(uncertain, apart<KIND>(pairs, i, lo, hi)));
       // What stays uncertain in a narrow bracket stays so in every interval around it.
-      const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
       const M stuck = hn::And(hn::AndNot(free, uncertain), narrow);
       result = choose(stuck, constant(ROOT_UNCERTAIN), result);
       kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);
@@ -164,7 +171,10 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
     result = choose(hn::And(hn::Eq(result, constant(ROOT_PENDING)), hn::Lt(width, smallest)), constant(ROOT_UNCERTAIN),
                     result);
   }
-  store(choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result), pairs.outcome, i);
+  result = choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result);
+  store(result, pairs.outcome, i);
+  const bool edges = KIND == BatchKind::EDGE_EDGE;
+  if (edges && !hn::AllFalse(d, hn::Eq(result, constant(ROOT_UNCERTAIN)))) settleParallel(pairs, i);
   store(kept_lo, pairs.root_lo, i);
   store(kept_hi, pairs.root_hi, i);
 }
