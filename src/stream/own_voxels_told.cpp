@@ -4,15 +4,13 @@
 #include <utility>
 
 #include "base/next_surface.h"
+#include "dccd/tolerances.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "stream/own_voxels.h"
 
 namespace dccd {
 namespace {
-
-/// [s] For so long after its picture what appeared there is near: pictures of other sensors come meanwhile.
-constexpr double SEEN_OF_LATE_S = 0.05;
 
 std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
 
@@ -69,7 +67,7 @@ ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelS
 std::vector<OccupiedLeaf> OwnVoxelFinder::seenInGroups(StampNs stamp_ns) const {
   std::unordered_set<std::uint64_t> keys;
   for (const auto& [key, seen] : seen_alone_)
-    if (seen.seen_ns >= stamp_ns - nanoseconds(SEEN_OF_LATE_S)) keys.insert(key);
+    if (seen.seen_ns >= stamp_ns - nanoseconds(tolerance::SEEN_OF_LATE_S)) keys.insert(key);
   std::vector<OccupiedLeaf> found;
   for (const OccupiedLeaf& voxel : seen_)
     if (keys.count(packed(voxel.min)) > 0 && isOfGroup(voxel.min, keys)) found.push_back(voxel);
