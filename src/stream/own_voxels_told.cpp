@@ -65,9 +65,10 @@ ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelS
 /// What was seen of late, without what a sensor's stray points may have made: fewer than Growth::GROUP voxels that
 /// touch each other.
 std::vector<OccupiedLeaf> OwnVoxelFinder::seenInGroups(StampNs stamp_ns) const {
+  constexpr auto OF_LATE_NS = static_cast<StampNs>(tolerance::SEEN_OF_LATE_S * 1e9);
   std::unordered_set<std::uint64_t> keys;
   for (const auto& [key, seen] : seen_alone_)
-    if (seen.seen_ns >= stamp_ns - nanoseconds(tolerance::SEEN_OF_LATE_S)) keys.insert(key);
+    if (seen.seen_ns >= stamp_ns - OF_LATE_NS) keys.insert(key);
   std::vector<OccupiedLeaf> found;
   for (const OccupiedLeaf& voxel : seen_)
     if (keys.count(packed(voxel.min)) > 0 && isOfGroup(voxel.min, keys)) found.push_back(voxel);
