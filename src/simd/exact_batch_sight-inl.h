@@ -149,7 +149,7 @@ HWY_INLINE Twofold dotOf(const Twofold (&a)[3], const Twofold (&b)[3]) {
 
 /// Settles the lanes that are still uncertain whose edges are certainly apart. What is across the change of B to the
 /// digits of a double alone would still change more than the heights of the edges above each other.
-HWY_NOINLINE void settleParallel(HardBlock& pairs, std::size_t i) {
+static HWY_NOINLINE void settleParallel(HardBlock& pairs, std::size_t i) {
   const V zero = hn::Zero(Tag());
   Factor u[2][3], v[2][3], w[2][3];
   const auto set = [&](int plane, Factor(&to)[2][3]) HWY_ATTR {
