@@ -138,6 +138,38 @@ TEST(ElementaryStructured, WhatNearlyMeetsAnEdgeIsTheIntegers) {
   }
 }
 
+/// All four vertices on one line through the origin at both ends of the step, the last bits of a difference far below
+/// those of its terms: nothing of what is 0 is computed as 0.
+PairMotion onOneLine(RandomSource& random) {
+  std::uniform_real_distribution<double> component(-1, 1);
+  std::uniform_int_distribution<int> exponent(0, 70), sign(0, 1);
+  const double along[3] = {component(random), component(random), component(random)};
+  PairMotion pair;
+  for (auto& ends : pair.x) {
+    for (auto& vertex : ends) {
+      const double times = std::ldexp(sign(random) == 0 ? 1.0 : -1.0, -exponent(random));
+      for (int k = 0; k < 3; ++k) vertex[k] = times * along[k];
+    }
+  }
+  return pair;
+}
+
+TEST(ElementaryStructured, EdgesOnOneLineAreNotApart) {
+  constexpr int TOC_BITS = 32;
+  RandomSource random(20261201);
+  int contacts = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const PairMotion pair = onOneLine(random);
+    const bool meet = exact::decideByBigIntegers(PairKind::EDGE_EDGE, pair, TOC_BITS).verdict == Verdict::CONTACT;
+    contacts += meet;
+    const Verdict batch = test::decideByBatch(PairKind::EDGE_EDGE, pair, TOC_BITS).verdict;
+    if (batch != Verdict::UNDECIDED) {
+      ASSERT_EQ(batch == Verdict::CONTACT, meet) << "pair " << i;
+    }
+  }
+  EXPECT_GT(contacts, 5000);
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd
