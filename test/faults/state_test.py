@@ -106,7 +106,7 @@ class StateTest(LiveNodeTest):
         self.assert_consistent()
 
     def test_steps_that_take_longer_than_frames_come(self):
-        self.start_node('slow', step_budget_ms=1e6, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
+        self.start_node('slow', step_budget_ms=1e4, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(280, 280)
         # Of two frames at once, the node's queue of one may drop the first before it is taken: then there is no step.
         self.publisher.publish(cloud.message())
@@ -145,7 +145,7 @@ class StateTest(LiveNodeTest):
         self.wait_missing('the step budget ran out')
 
     def test_a_reset_while_a_step_is_computed(self):
-        self.start_node('reset', step_budget_ms=1e6, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
+        self.start_node('reset', step_budget_ms=1e4, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(330, 330)  # a step that takes longer than it takes to ask
         rospy.wait_for_service('/reset/reset', 10)
         reset = rospy.ServiceProxy('/reset/reset', Trigger, persistent=True)

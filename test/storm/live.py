@@ -40,7 +40,8 @@ def play(folder):
     rospy.init_node('world', anonymous=True, disable_signals=True, disable_rostime=True)
     clock = rospy.Publisher('/clock', Clock, queue_size=10, latch=True)
     publishers = {topic: rospy.Publisher(topic, type(message), queue_size=100) for topic, message, _ in rows}
-    wait_for(lambda: all(one.get_num_connections() > 0 for one in [clock, *publishers.values()]), PATIENCE_S, 'the node to listen')
+    heard = [clock, *(one for topic, one in publishers.items() if not topic.endswith('camera_info'))]  # for that it asks at the first picture
+    wait_for(lambda: all(one.get_num_connections() > 0 for one in heard), PATIENCE_S, 'the node to listen')
     offered = {topic for topic, _ in rospy.get_published_topics(NODE)}
     hears = [rospy.Subscriber(topic, kind, lambda message, topic=topic: said.append((topic, message, now[0])), queue_size=1000)
              for topic, kind in ((NODE + '/' + name, kind) for name, kind in said_topics().items()) if topic in offered]
