@@ -92,23 +92,19 @@ void OwnVoxelFinder::seeAlone(const OccupiedLeaf& voxel, Look& look) {
   const auto before = seen_alone_.find(key);
   const bool was_seen = before != seen_alone_.end();
   // What one look left behind stands in the next map, too, if nothing looks there.
-  const SeenVoxel last = was_seen ? before->second : SeenVoxel();
-  const bool again = was_seen && (last.again || !look.tellsFound() || look.wasFound(voxel));
-  look.seen_alone[key] = {again, look.seen_now.count(key) > 0 ? look.map.stamp_ns : last.seen_ns};
+  look.seen_alone[key] = was_seen && (before->second || !look.tellsFound() || look.wasFound(voxel));
   seen_.push_back(voxel);
 }
 
 bool OwnVoxelFinder::wasSeenAgain(const OccupiedLeaf& voxel) const {
   const auto seen = seen_alone_.find(packed(voxel.min));
-  return seen != seen_alone_.end() && seen->second.again;
+  return seen != seen_alone_.end() && seen->second;
 }
 
 /// What is in doubt for the map's maker.
 void OwnVoxelFinder::listSeen(Look& look) {
   seen_.clear();
   if (!look.map.own.doubted_surface) return;
-  if (look.map.own.seen)
-    for (const OccupiedLeaf& voxel : *look.map.own.seen) look.seen_now.insert(packed(voxel.min));
   const std::size_t most = look.cubes.size() + tolerance::MOST_OWN_ASKED;
   auto askSeen = [&](const OccupiedLeaf& voxel) {
     if (!meets(voxel, look.region) || look.cubes.size() >= most) return seeAlone(voxel, look);

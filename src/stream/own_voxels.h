@@ -13,7 +13,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -30,8 +29,7 @@
 
 namespace dccd {
 
-/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these,
-/// and `seen` those that its last cloud saw.
+/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these.
 constexpr std::uint16_t NOBODY = 0xffff;
 
 /// Not thread-safe.
@@ -69,12 +67,9 @@ class OwnVoxelFinder {
     bool grew = false;    // it came from outside of every reach: own voxels beside it may hold more of it
     StampNs left_ns = 0;  // since when it is LEFT or LEFT_SEEN
   };
-  /// What a map's maker saw, not often enough for an obstacle, with nobody within reach.
-  struct SeenVoxel {
-    bool again = false;  // in more than one map: it is there, whoever comes; once is a sensor's noise
-    StampNs seen_ns = std::numeric_limits<StampNs>::min();  // the last time
-  };
-  using SeenAlone = std::unordered_map<std::uint64_t, SeenVoxel>;  // packed
+  /// What a map's maker saw, not often enough for an obstacle, with nobody within reach: packed, and whether in more
+  /// than one map. One is a sensor's noise where a body comes next; what was seen again is there, whoever comes.
+  using SeenAlone = std::unordered_map<std::uint64_t, bool>;
   /// Of one map.
   struct Look;
   /// Bodies that were there, their ways up to it, and whether some other place of theirs was not known.
@@ -105,7 +100,6 @@ class OwnVoxelFinder {
   /// The map without what is own or in doubt, with what is trusted.
   ObstacleMap withoutOwn(ObstacleMap map, const VoxelSurface* trusted, const std::vector<TrackedBody>& bodies,
                          bool trust_first);
-  std::vector<OccupiedLeaf> seenInGroups(StampNs stamp_ns) const;
 
   std::shared_ptr<const VoxelSurface> before_;      // as it was given; null: none
   std::shared_ptr<const KnownSpace> known_before_;  // null: what is not occupied there is free

@@ -27,10 +27,9 @@ struct OwnVoxelFinder::Look {
   KeyBox region{};                      // around all of them
   std::vector<ReachedCube> cubes{};     // of which it matters who reached them
   std::vector<Stated> appeared{};       // what is own or in doubt from now on
-  std::unordered_set<std::uint64_t> unknown{};   // packed, of what appeared, and the map before left out
-  std::vector<OccupiedLeaf> hidden{};            // obstacles, remembered from now on
-  SeenAlone seen_alone{};                        // from now on
-  std::unordered_set<std::uint64_t> seen_now{};  // packed, of what is in doubt for the map's maker, in this map
+  std::unordered_set<std::uint64_t> unknown{};  // packed, of what appeared, and the map before left out
+  std::vector<OccupiedLeaf> hidden{};           // obstacles, remembered from now on
+  SeenAlone seen_alone{};                       // from now on
 
   /// Who may go on to account for what these do.
   BodySet askedWith(const BodySet& owners) const {

@@ -170,6 +170,39 @@ TEST(ElementaryStructured, EdgesOnOneLineAreNotApart) {
   EXPECT_GT(contacts, 5000);
 }
 
+/// In the plane y = 0, b and d at one place when the step begins. What is across the change of B is as short as a's x,
+/// a power of two near the least one.
+PairMotion meetingAtTheStart(RandomSource& random) {
+  const auto draw = [&](int lo, int hi) { return std::uniform_int_distribution<int>(lo, hi)(random); };
+  const auto oddOf = [&](int bits, int exponent) {
+    const std::uint64_t top = std::uint64_t{1} << (bits - 1);
+    const std::uint64_t digits = std::uniform_int_distribution<std::uint64_t>(top, 2 * top - 1)(random) | 1;
+    return std::ldexp(static_cast<double>(digits), exponent - bits + 1);
+  };
+  const int p = draw(46, 149), q = draw(46, p), s = draw(20, 40);
+  const double x = oddOf(48, p), z = oddOf(53, q - s), tiny = -std::ldexp(1, std::max(-1074, -985 - (q - s)));
+  const double later_z = z - std::ldexp(1, q - s - 7);
+  PairMotion pair{};
+  for (const int end : {0, 1}) {
+    pair.x[end][0][0] = tiny, pair.x[end][0][2] = -std::ldexp(1, q + end);
+    pair.x[end][1][0] = pair.x[end][3][0] = x;
+    pair.x[end][1][2] = end == 0 ? z : later_z, pair.x[end][3][2] = z;
+  }
+  return pair;
+}
+
+TEST(ElementaryStructured, EdgesThatMeetAtTheStartAreNotApart) {
+  RandomSource random(20261202);
+  int undecided = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const PairMotion pair = meetingAtTheStart(random);
+    const Verdict batch = test::decideByBatch(PairKind::EDGE_EDGE, pair, 32).verdict;
+    ASSERT_NE(batch, Verdict::NO_CONTACT) << "pair " << i;
+    undecided += batch == Verdict::UNDECIDED;
+  }
+  EXPECT_GT(undecided, 0) << "nothing of it was hard";
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd
