@@ -2,6 +2,7 @@
 jumps, a disk that is full. Each test starts a node of its own."""
 import os
 import pathlib
+import signal
 import socket
 import struct
 import subprocess
@@ -17,7 +18,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
-from ros_process import SLOW, wait_for
+from ros_process import SLOW, free_port, wait_for
 from live_node import Cloud, LiveNodeTest, resident_kb, simulated_time
 
 
@@ -148,6 +149,16 @@ class NodeFaultsTest(LiveNodeTest):
         self.assertEqual(subprocess.run([str(self.tool('replay_step')), answer.message], stdout=subprocess.DEVNULL).returncode, 0)
         self.assertEqual(self.stats[-1].frames_received, 3)
         self.assert_adds_up(self.stats[-1])
+
+    def test_what_waits_for_a_master_ends(self):
+        for sent in (signal.SIGINT, signal.SIGTERM):
+            node = subprocess.Popen([str(self.tool('collision_monitor_node'))], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                    env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % free_port()))
+            self.addCleanup(node.stderr.close)
+            self.addCleanup(node.kill)
+            self.assertIn('Failed to contact master', node.stderr.readline())
+            node.send_signal(sent)
+            self.assertEqual(node.wait(timeout=5 * SLOW), 0)
 
     def test_the_master_goes_and_comes_back(self):
         node = self.start_node('masterless')
