@@ -237,7 +237,10 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
       if (has_gap) changes.push_back({end_ns, &frame.name, nullptr, nullptr});
       const bool is_leaving = next != frame.sent.end() && next->second.parent != parent &&
                               std::prev(next)->first < end_ns && end_ns == to_ns;
-      if (is_leaving) changes.push_back({next->first, &frame.name, &parent->name, &next->second.parent->name});
+      if (is_leaving) {
+        const StampNs last_ns = std::prev(next)->first;
+        changes.push_back({next->first, &frame.name, &parent->name, &next->second.parent->name, last_ns});
+      }
       const bool has_all = since_ns <= from_ns || (before == parent && !frame.is_cut);
       if (has_all && !has_gap && !is_leaving && stamps.size() == found_before) frame.none_between = question;
       if (has_all || since_ns <= last.stamp_ns) return;

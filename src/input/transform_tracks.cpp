@@ -33,9 +33,9 @@ Knot unknownBefore(const TransformFeed::NewParent& change) {
                                             shortText(*change.now, MAX_NAME) + "' at " + secondsOf(change.stamp_ns));
 }
 
-/// A sample with the new parent is there.
+/// A sample with the new parent is there, or one with the old.
 bool isKnownAt(StampNs stamp_ns, const TransformFeed::NewParent& change) {
-  return change.now && change.stamp_ns <= stamp_ns;
+  return change.now && (change.stamp_ns <= stamp_ns || stamp_ns <= change.last_ns);
 }
 
 }  // namespace

@@ -83,7 +83,11 @@ TransformFeed::Jump TransformFeed::jumpOf(const Frame* frame, StampNs stamp_ns, 
                                           const std::string& sender) const {
   if (!frame || frame->sent.empty()) return Jump::NONE;
   const StampNs newest_ns = frame->sent.rbegin()->first;
-  if (stamp_ns >= newest_ns) return Jump::NONE;  // nearly always: it is not looked for among thousands
+  if (stamp_ns >= newest_ns) {  // nearly always: it is not looked for among thousands
+    // It leaps over all that was forgotten when stamps went back: two streams under one name.
+    const bool leaps = newest_ns < frame->forgotten_ns - JUMP_BACK_NS && stamp_ns > frame->forgotten_ns;
+    return leaps ? Jump::TWO_SENDERS : Jump::NONE;
+  }
   if (stamp_ns < newest_ns - JUMP_BACK_NS) {
     const auto its_newest = frame->newest.find(sender);
     const bool went_back = its_newest != frame->newest.end() && stamp_ns < its_newest->second - JUMP_BACK_NS;
@@ -95,12 +99,17 @@ TransformFeed::Jump TransformFeed::jumpOf(const Frame* frame, StampNs stamp_ns, 
   return *at_stamp->second.sender == sender ? Jump::LOOP : Jump::TWO_SENDERS;
 }
 
-/// What was sent of one that moves.
-void TransformFeed::forget(Frame& frame) {
-  kept_count_ -= frame.sent.size();
+void TransformFeed::emptied(Frame& frame) {
+  if (!frame.sent.empty()) frame.forgotten_ns = frame.sent.rbegin()->first;
   ++frame.times_forgotten;
   frame.sent.clear();
   frame.lead = {};
+}
+
+/// What was sent of one that moves.
+void TransformFeed::forget(Frame& frame) {
+  kept_count_ -= frame.sent.size();
+  emptied(frame);
   frame.is_cut = frame.is_apart = has_apart_ = true;
 }
 
@@ -158,10 +167,8 @@ bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform,
 /// Keeps static transforms.
 void TransformFeed::clear() {
   for (auto& named : frames_) {
-    ++named.second.times_forgotten;
-    named.second.sent.clear();
+    emptied(named.second);
     named.second.newest.clear();
-    named.second.lead = {};
     named.second.is_cut = named.second.is_apart = named.second.passed_over = false;
   }
   kept_count_ = 0;

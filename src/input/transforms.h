@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -68,6 +69,7 @@ class TransformFeed {
   struct NewParent {
     StampNs stamp_ns;
     const std::string *frame, *before, *now;
+    StampNs last_ns = std::numeric_limits<StampNs>::min();  ///< of the last transform of before; or none
   };
   /// Ascending: between the two, neither included, each stamp of a transform that target_from_source is made of then.
   /// Added to `changes`, newest first: from when on, after from_ns and up to to_ns, it was made of other frames than
@@ -140,6 +142,7 @@ class TransformFeed {
     bool is_disputed = false;               ///< it is on both topics, and not at one place
     std::uint64_t times_forgotten = 0;      ///< what was sent of it,
     std::uint64_t forgotten_before = 0;     ///< and how often when time began anew
+    StampNs forgotten_ns = 0;               ///< the newest of what was forgotten the last time
     StampLead lead;                         ///< of one that moves
     // What was asked for last is asked for again by every frame below this one.
     mutable std::uint64_t asked_change = 0;
@@ -170,6 +173,7 @@ class TransformFeed {
   enum class Jump : std::uint8_t { NONE, LOOP, TWO_SENDERS };
   /// now: what is sent. frame: of which; null: of one that is not known.
   Jump jumpOf(const Frame* frame, StampNs stamp_ns, const Sent& now, const std::string& sender) const;
+  static void emptied(Frame& frame);
   void forget(Frame& frame);
   void forgetAllOf(const std::string& sender);
   static bool isSame(const Sent& a, const Sent& b, double tolerance);

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "input/transform_tracks.h"
 #include "node/bag_reading.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
@@ -183,6 +184,45 @@ TEST_F(TransformFeedTest, TwoPublishersOfAFrameForgetThatFrameAlone) {
   EXPECT_EQ(pose.translation().x(), -2) << "the newest";
   feed.stampsBetween("world", "spinner", 13000000000, 15500000000, changes);
   EXPECT_FALSE(changes.empty()) << "where it was before that nobody knows";
+}
+
+// As a node that passes on two recordings that are played in loops.
+TEST_F(TransformFeedTest, TwoStreamsUnderOneNameHaveNoPlaceBetweenThem) {
+  Eigen::Isometry3d pose;
+  std::string reason;
+  for (const bool alone : {true, false}) {  // then all is forgotten at once, and not the publisher's frames
+    TransformFeed fresh;
+    if (!alone) fresh.add(turned("camera", 1, 10), false, "/camera");
+    for (int k = 0; k < 50; ++k) {
+      const double now_s = 10 + 0.1 * k;
+      fresh.add(turned("finger", 1, now_s, k), false, "/relay");
+      EXPECT_FALSE(fresh.lookup("world", "finger", std::llround(1e9 * (now_s - 0.7)), pose, reason)) << k;
+      fresh.add(turned("finger", 1, now_s - 1.5, 5), false, "/relay");
+    }
+  }
+}
+
+TEST_F(TransformFeedTest, AFrameThatChangesItsParentHasItsPlaceAtBothStamps) {
+  feed.add(turned("arm", 1, 1), true);
+  for (const double stamp_s : {1.0, 1.25, 1.5}) {
+    feed.add(turned("finger", 1, stamp_s, 3, stamp_s < 1.5 ? "world" : "arm"), false);
+  }
+  const std::string world = "world";
+  const TransformTracks tracks(feed, world);
+  EXPECT_EQ(tracks.doubtAt("world", "finger", 1250000000), "");
+  EXPECT_NE(tracks.doubtAt("world", "finger", 1250000001), "") << "between the two";
+  EXPECT_NE(tracks.doubtAt("world", "finger", 1499999999), "");
+  EXPECT_EQ(tracks.doubtAt("world", "finger", 1500000000), "");
+}
+
+TEST_F(TransformFeedTest, ALoopGoesOnOverItsOwnEnd) {
+  Eigen::Isometry3d pose;
+  std::string reason;
+  for (const double begin_s : {10.0, 10.125}) {
+    for (int k = 0; k < 6; ++k) feed.add(turned("finger", 1, begin_s + 0.75 * k, k), false);
+  }
+  EXPECT_TRUE(feed.lookup("world", "finger", 13500000000, pose, reason)) << reason;
+  EXPECT_NEAR(pose.translation().x(), 4.5, 1e-9) << "between 13.125 and 13.875 s, and the first run ended at 13.75";
 }
 
 TEST_F(TransformFeedTest, APublisherWhoseStampsGoBackForgetsWhatItSent) {
