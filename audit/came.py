@@ -521,7 +521,7 @@ def picture_points(m, infos):
     """Pixels of a depth picture, as points of its optical frame; those without a depth are NaN. Where no info has its stamp, all say the same."""
     infos = [info for info in infos if info.header.stamp == m.header.stamp][-1:] or infos
     if len({info.P for info in infos}) != 1 or not (info := infos[0]).P[0] > 0 or (info.height, info.width) != (m.height, m.width):
-        raise Refused('no camera_info is of this picture')
+        raise NotCovered('several CameraInfos, none of them of a picture\'s stamp') if len(infos) > 1 else Refused('no camera_info is of this picture')
     kind, metres = {'16UC1': ('u2', 0.001), 'mono16': ('u2', 0.001), '32FC1': ('f4', 1.0)}[m.encoding]
     depth = np.ndarray((m.height, m.width), ('>' if m.is_bigendian else '<') + kind, m.data, 0, (m.step, np.dtype(kind).itemsize))
     z = np.where(depth > 0, depth * metres, np.nan)

@@ -255,8 +255,7 @@ class Stream:
             if self.held and self.held[-1].stamp > frame.stamp + NS:
                 self.held, self.voided = [], []  # time begins anew
             while self.held and self.held[-1].stamp > frame.stamp:
-                late = self.held.pop()
-                self.voided += [late.stamp] if late.stamp <= frame.stamp + NS else []
+                self.voided.append(self.held.pop().stamp)
             self.held.append(frame)
             self.taken += 1
         return self.held

@@ -95,9 +95,15 @@ def rebuilt(seed, folder, keep):
     """The same world with only these of its faults: the others are drawn, too, so that the rest stays as it is."""
     class Some(worlds.World):
         def fault(self, kind):
-            before = copy.deepcopy(self.rows)
-            super().fault(kind)
-            if self.faults[-1] not in keep:
+            self.unless_left_out(super().fault, kind)
+
+        def handed_over(self, r):
+            self.unless_left_out(super().handed_over, r)
+
+        def unless_left_out(self, change, given):
+            before, count = copy.deepcopy(self.rows), len(self.faults)
+            change(given)
+            if set(self.faults[count:]) - set(keep):
                 self.rows = before
     return Some(seed, folder)
 

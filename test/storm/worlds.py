@@ -363,7 +363,7 @@ class World:
         cubes = [((32768 + r.randrange(-16, 16, 1 << level), 32768 + r.randrange(-16, 16, 1 << level), 32768 + r.randrange(-16, 16, 1 << level)), level,
                   r.random() < .4) for level in [r.choice([0, 1, 1, 2]) for _ in range(r.choice([5, 20]))]]
         for row in maps:
-            cubes = [(key, level, occupied != (r.random() < .1)) for key, level, occupied in cubes if r.random() < .95]
+            cubes = [(key, level, occupied != (r.random() < .1)) for key, level, occupied in cubes if r.random() < .95] or cubes
             row[1].binary, row[1].data = False, full_octree(cubes, r.choice([.85, 3.5]))
 
     def filed(self, p, maps):
@@ -394,7 +394,7 @@ class World:
             data = depth.astype('<f4') if metres else np.round(depth * 1000).astype('<u2')
             picture = Image(height=height, width=width, encoding='32FC1' if metres else '16UC1', step=data.strides[0], data=data.tobytes())
             picture.header.frame_id, picture.header.stamp = 'eye', cloud.header.stamp
-            info = CameraInfo(header=picture.header, height=height, width=width, distortion_model='plumb_bob', D=[0] * 5,
+            info = CameraInfo(header=copied(picture.header), height=height, width=width, distortion_model='plumb_bob', D=[0] * 5,
                               K=[30, 0, 15.5, 0, 30, 11.5, 0, 0, 1], R=[1, 0, 0, 0, 1, 0, 0, 0, 1], P=[30, 0, 15.5, 0, 0, 30, 11.5, 0, 0, 0, 1, 0])
             for topic, message in (('/depth/camera_info', info), ('/depth/image', picture)):
                 self.rows.append([topic, message, came, topic])
@@ -442,7 +442,8 @@ class World:
         rows = [row for row in self.rows if row[0] == '/tf']
         child = r.choice(rows)[1].transforms[0].child_frame_id
         mine = [row[1].transforms[0] for row in rows if row[1].transforms[0].child_frame_id == child]
-        at, parent = r.randrange(len(mine)), r.choice(['world', 'mount'])
+        at = r.randrange(len(mine))
+        parent = r.choice([name for name in ('world', 'mount') if name != mine[at].header.frame_id])
         for one in mine[at:at + r.choice([1, 3, len(mine)])]:
             one.header.frame_id = parent
         self.faults.append('%s is handed over to %s at %d' % (child, parent, at))
@@ -574,7 +575,8 @@ def damaged(message, r):
     if isinstance(message, TFMessage):
         setattr(message.transforms[0].transform.rotation, 'w', r.choice([nan, 5.0]))
     elif isinstance(message, PointCloud2):
-        message.data = message.data[:-5] if r.random() < .5 else struct.pack('<f', nan) + message.data[4:]
+        number = struct.pack('>8xd', nan) if message.is_bigendian else struct.pack('<f', nan)
+        message.data = message.data[:-5] if r.random() < .5 else number + message.data[len(number):]
     elif isinstance(message, Octomap):
         message.data = message.data[:r.randrange(1, 20)]
     elif isinstance(message, Image):
