@@ -29,8 +29,8 @@ struct OwnVoxels {
   // Not recorded.
   std::shared_ptr<const std::vector<OwnVoxel>> voxels{};  ///< for display; null: none
   std::shared_ptr<const VoxelSurface> doubted_surface{};  ///< of those in doubt; null: there are none
-  /// Of these what sensors saw just now, with no body near, but not often enough for an obstacle, in four voxels or
-  /// more that touch each other: distances are taken to it, too.
+  /// Of these what the newest view of some sensor saw, with no body near, but not often enough for an obstacle, in four
+  /// voxels or more that touch each other: distances are taken to it, too.
   std::shared_ptr<const std::vector<OccupiedLeaf>> seen{};  ///< null: none
 };
 

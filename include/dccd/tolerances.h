@@ -266,10 +266,6 @@ constexpr double OWN_GROWTH_S = 1;
 /// there meanwhile is more easily taken for it. Smaller: an arm that goes to and fro meets its own doubt; in the real
 /// cell that costs one step in nine at half a second, none at three.
 constexpr double OWN_LEFT_S = 3;
-/// [s] For so long after its picture distances are taken to what a sensor saw, but not often enough for an obstacle.
-/// Larger: stray pixels of several pictures lie beside each other; in the real cell the scale is 0 in one step of a
-/// hundred at 0.1. Smaller: what one of several sensors saw is forgotten with the next one's picture.
-constexpr double SEEN_OF_LATE_S = 0.05;
 /// [1] of a voxel: how far the map's frame may move before its voxels are other ones. Larger: a body's way is placed
 /// the less exactly among them. Smaller: a frame that trembles ends all that is own.
 constexpr double OWN_FRAME = 0x1p-6;

@@ -339,14 +339,16 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
     seen.clears = !(message.is_behind && known != views_.end() && known->second.fills_next);
     insert(seen, reading);
     views_.erase({message.source, {}});
-    views_[reading.view] = {{}, true, message.receipt_ns, map.stamp_ns, seen.clears};
+    views_[reading.view] = {{}, true, message.receipt_ns, map.stamp_ns, seen.clears, map_->doubtfulNow()};
     if (!seen.clears) ++only_filled_;
     is_seen = true;
     checkOthers(reading.view, message.receipt_ns);
     const std::vector<OccupiedLeaf>& doubtful = map_->doubtful();
     if (!doubtful.empty()) {
       map.own.doubted_surface = memory_.counted(VoxelSurface::build(config_.cloud_map.resolution_m, doubtful));
-      map.own.seen = share(map_->doubtfulNow());
+      std::vector<OccupiedLeaf> now;
+      for (const auto& [name, view] : views_) now.insert(now.end(), view.doubtful.begin(), view.doubtful.end());
+      map.own.seen = share(std::move(now));
     }
     return map_->leaves(limits);
   });

@@ -76,7 +76,8 @@ class CloudMapping {
     bool is_known = false;                                   // one of them was
     StampNs receipt_ns = 0;                                  // of the newest one
     StampNs stamp_ns = std::numeric_limits<StampNs>::min();  // of the last one that is in the map
-    bool fills_next = false;  // the last one cleared, and the next is to do without if time is short
+    bool fills_next = false;               // the last one cleared, and the next is to do without if time is short
+    std::vector<OccupiedLeaf> doubtful{};  // what that one saw and the map had in doubt then
   };
   const MonitorConfig& config_;
   const TransformFeed& transforms_;

@@ -93,8 +93,9 @@ void History::Impl::setOptions(const Options& wanted) {
 }
 
 void History::Impl::setBodies(const Step& step) {
-  check(*prepared.options, step.bodies);
-  if (prepared.bodies_known && scene.holds(step.bodies)) return;
+  const bool known = prepared.bodies_known && scene.holds(step.bodies);
+  if (!known || !prepared.expected_known) check(*prepared.options, step.bodies);  // else it was, with these options
+  if (known) return;
   prepared.bodies_known = false;
   carried.clear();
   const std::size_t held = scene.setBodies(step.bodies);

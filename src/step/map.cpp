@@ -79,11 +79,13 @@ std::shared_ptr<const VoxelSurface> withSeen(const ObstacleMap& map, const std::
                                              const std::shared_ptr<const VoxelSurface>& reduced) {
   if (!reduced || !map.own.seen) return reduced;
   const double resolution_m = reduced->resolution();
-  std::vector<OccupiedLeaf> leaves = reduced->leaves();
-  const auto add = [&](const OccupiedLeaf& leaf) { leaves.push_back(leaf); };
+  const VoxelTree& tree = VoxelSurface::Impl::of(*reduced).tree;
+  std::vector<OccupiedLeaf> more;
+  const auto add = [&](const OccupiedLeaf& leaf) { more.push_back(leaf); };
   const RemainingLeaves seen = leavesOutside(*map.own.seen, resolution_m, map.map_from_fixed.inverse(), exclude_boxes);
-  for (const OccupiedLeaf& leaf : seen.leaves) visitUncovered(VoxelSurface::Impl::of(*reduced).tree, leaf, add);
-  return nextSurface(resolution_m, std::move(leaves), *reduced);
+  for (const OccupiedLeaf& leaf : seen.leaves) visitUncovered(tree, leaf, add);
+  const VoxelTree nothing{std::vector<OccupiedLeaf>()};
+  return nextSurface(resolution_m, leavesWithout(tree, nothing, more), *reduced);
 }
 
 }  // namespace

@@ -107,12 +107,12 @@ class LeavingPlanes {
 
   void addFeatures(const Eigen::AlignedBox3d& near) {
     if (partner_ == OBSTACLE_BODY) {
-      const double resolution_m = outcome_.obstacle->resolution();
+      const double resolution_m = outcome_.measured->resolution();
       const auto corner = [&](const VoxelKey& key, std::int64_t size) {
         return Vec3(voxelPlane(key.x + size, resolution_m), voxelPlane(key.y + size, resolution_m),
                     voxelPlane(key.z + size, resolution_m));
       };
-      for (const OccupiedLeaf& leaf : outcome_.obstacle->leaves()) {
+      for (const OccupiedLeaf& leaf : outcome_.measured->leaves()) {
         const Eigen::AlignedBox3d box(corner(leaf.min, 0), corner(leaf.min, leaf.size));
         if (near.intersects(box)) features_.push_back({box, {}});
       }

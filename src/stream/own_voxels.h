@@ -29,7 +29,8 @@
 
 namespace dccd {
 
-/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these.
+/// OwnVoxel::body where the map's maker doubts it. ObstacleMap::own.doubted_surface of a map that is given has these,
+/// and `seen` those in which the newest view of some sensor saw something, be it more.
 constexpr std::uint16_t NOBODY = 0xffff;
 
 /// Not thread-safe.
@@ -100,6 +101,7 @@ class OwnVoxelFinder {
   /// The map without what is own or in doubt, with what is trusted.
   ObstacleMap withoutOwn(ObstacleMap map, const VoxelSurface* trusted, const std::vector<TrackedBody>& bodies,
                          bool trust_first);
+  std::vector<OccupiedLeaf> seenInGroups(const std::vector<OccupiedLeaf>& seen_now) const;
 
   std::shared_ptr<const VoxelSurface> before_;      // as it was given; null: none
   std::shared_ptr<const KnownSpace> known_before_;  // null: what is not occupied there is free

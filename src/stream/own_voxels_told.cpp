@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "base/next_surface.h"
-#include "dccd/tolerances.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "stream/own_voxels.h"
@@ -59,16 +58,17 @@ ObstacleMap OwnVoxelFinder::reducedAnew(const ObstacleMap& reduced, const VoxelS
   map.surface = before_;
   map.own = OwnVoxels();
   map.own.looked_at = reduced.own.looked_at;
+  map.own.seen = reduced.own.seen;
   return withoutOwn(std::move(map), trusted, bodies, trust_first);
 }
 
-/// What was seen of late, without what a sensor's stray points may have made: fewer than Growth::GROUP voxels that
-/// touch each other.
-std::vector<OccupiedLeaf> OwnVoxelFinder::seenInGroups(StampNs stamp_ns) const {
-  constexpr auto OF_LATE_NS = static_cast<StampNs>(tolerance::SEEN_OF_LATE_S * 1e9);
-  std::unordered_set<std::uint64_t> keys;
-  for (const auto& [key, seen] : seen_alone_)
-    if (seen.seen_ns >= stamp_ns - OF_LATE_NS) keys.insert(key);
+/// What is in doubt and was seen just now, without what a sensor's stray points may have made: fewer than Growth::GROUP
+/// voxels that touch each other.
+std::vector<OccupiedLeaf> OwnVoxelFinder::seenInGroups(const std::vector<OccupiedLeaf>& seen_now) const {
+  std::unordered_set<std::uint64_t> now, keys;
+  for (const OccupiedLeaf& voxel : seen_now) now.insert(packed(voxel.min));
+  for (const OccupiedLeaf& voxel : seen_)
+    if (now.count(packed(voxel.min)) > 0) keys.insert(packed(voxel.min));
   std::vector<OccupiedLeaf> found;
   for (const OccupiedLeaf& voxel : seen_)
     if (keys.count(packed(voxel.min)) > 0 && isOfGroup(voxel.min, keys)) found.push_back(voxel);
@@ -97,7 +97,8 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
     if (voxel.doubted) doubted.push_back({voxel.key, 1});
   }
   map.own.doubted_surface = doubted.empty() ? nullptr : VoxelSurface::build(resolution_m, std::move(doubted));
-  std::vector<OccupiedLeaf> seen = seenInGroups(map.stamp_ns);
+  std::vector<OccupiedLeaf> seen;
+  if (map.own.seen) seen = seenInGroups(*map.own.seen);
   map.own.seen = seen.empty() ? nullptr : share(std::move(seen));
   map.own.voxels = share(std::move(voxels));
   describe(bodies, trust_first, map.known != nullptr, gap_, map.own);

@@ -157,7 +157,7 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
     if (step_->bodies.size() != outcome.step->bodies.size()) say("there are other bodies");
     const bool moved = obstacle_ && outcome.obstacle &&
                        step_->map.fromFixedAt(1).matrix() != outcome.step->map.fromFixedAt(1).matrix();
-    const bool grew = outcome.obstacle && outcome.obstacle != obstacle_ &&
+    const bool grew = outcome.obstacle && outcome.measured != obstacle_ &&
                       (obstacle_ ? hasNewVoxels(*outcome.obstacle, *obstacle_) : outcome.obstacle->leafCount() > 0);
     const std::string why = why_void_ && outcome.stamp_ns <= promise_ends_ns ? why_void_(outcome) : "";
     if (!why.empty()) say(why);
@@ -174,7 +174,7 @@ const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
 void PromiseWatch::keep(const Outcome& outcome) {
   ++counts_.made;
   step_ = outcome.step;
-  obstacle_ = outcome.obstacle;
+  obstacle_ = outcome.measured;  // what was seen too seldom, it counts already
   assumed_ = boundsOf(outcome, bounds_);
 }
 

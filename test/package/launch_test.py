@@ -235,7 +235,7 @@ class LaunchTest(unittest.TestCase):
         for words in starts:
             with self.subTest(words[0]):
                 started = self.start(*words)
-                wait_for(lambda: '/tf' in self.subscribed(master), 30, 'the monitor')
+                wait_for(lambda: '/octomap_binary' in self.subscribed(master), 30, 'the monitor')  # after it said so
                 stop(started)  # which flushes what it said
                 self.expect_said(default, words[0])
                 wait_for(lambda: not self.subscribed(master), 30, 'its end')

@@ -206,6 +206,13 @@ TEST(IntendedPath, WhatTouchesAtItsSurfaceMayLeave) {
   }
 }
 
+TEST(IntendedPath, WhatLeavesTheTableMayMeetWhatASensorSawTooSeldom) {
+  Scene up = Scene(0).goes({0, 0, 0.3}, 1).tube(0.002, 0.01);
+  up.step.map.own.seen = share(std::vector<OccupiedLeaf>{{{32768, 32768, 32771}, 1}});  // 0.05 m above it
+  const double s = up.run().scale.scale;
+  EXPECT_LE(0.3 * (s * 0.1 + s * s * 0.15), 0.05 - 0.025 + 1e-9);
+}
+
 TEST(IntendedPath, WhatGoesOnIntoWhatItTouchesDoesNot) {
   for (const Vec3& way : {Vec3(0, 0, -0.3), Vec3(0.3, 0, -0.001)}) {
     const AlongPath along = Scene(0).goes(way, 1).run();

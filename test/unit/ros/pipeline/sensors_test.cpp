@@ -605,6 +605,10 @@ TEST(Sensors, DistancesAreTakenToWhatWasSeenTooSeldom) {
       EXPECT_NEAR(distance.upper_m, truth_m, 1e-3) << points << is_excluded;
       EXPECT_LE(distance.lower_m, distance.upper_m);
       if (points == 4) {
+        camera.showCamera("other");
+        camera.give(camera.add(cloudOf(1.15, {{0.0125f, -0.0125f, 1}}, "other")));
+        const double now_m = camera.feed(1.22, 0.6f).clearances[0].over_step.upper_m;
+        EXPECT_NEAR(now_m, truth_m, 1e-3) << "another one does not look there";
         camera.give(camera.add(cloudOf(1.2, {{0.0125f, -0.0125f, 1}})));
         const Outcome& unseen = camera.feed(1.25, 0.6f);
         EXPECT_EQ(unseen.step->map.own.doubted, 4u) << "nobody looked there";
