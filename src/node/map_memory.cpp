@@ -43,9 +43,10 @@ std::size_t MapMemory::accept(const OctomapCounts& counts) const {
   // Log-odds of this map and of the one before, and where it found something.
   if (config_.ownsVoxels()) least += counts.occupied * (3 * MAP_LEAF_LISTED + 2 * sizeof(float));
   const bool excludes = !config_.monitor.detector.exclude_boxes.empty();
-  for (int copies = excludes + config_.ownsVoxels() + clouds; copies > 0; --copies) {
+  for (int copies = excludes + config_.ownsVoxels(); copies > 0; --copies) {
     least += built(counts.occupied, counts.occupied_nodes) + need.kept + MAX_ADDED_LEAVES * MAP_LEAF_ADDED;
   }
+  if (clouds) least += built(counts.occupied, counts.occupied_nodes) + need.kept;  // with what was seen too seldom
   const std::size_t wanted = std::max(least, need.most + held);
   if (wanted <= room) return (room - wanted) / MAP_LEAF_ADDED;
   throw OctomapError("octomap data hold " + std::to_string(counts.occupied) + " occupied and " +

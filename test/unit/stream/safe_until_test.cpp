@@ -435,7 +435,7 @@ TEST(PromiseWatch, AMapThatGrowsOrMovesAndNotOneThatShrinks) {
       step.map.surface = VoxelSurface::build(0.1, std::move(leaves));
       step.map.map_from_fixed.translation().x() = x;
     });
-    outcome.obstacle = outcome.step->map.surface;
+    outcome.obstacle = outcome.measured = outcome.step->map.surface;
     return outcome;
   };
   const OccupiedLeaf a{{40000, 40000, 40000}, 4}, b{{100, 100, 100}, 1}, part{{40002, 40000, 40000}, 2};
@@ -460,6 +460,10 @@ TEST(PromiseWatch, AMapThatGrowsOrMovesAndNotOneThatShrinks) {
   EXPECT_EQ(brokenBy(withMap(1, {a}), withMap(2 * MS, {a, b})), "the map has new voxels");
   EXPECT_EQ(brokenBy(withMap(1, {}), withMap(2 * MS, {b})), "the map has new voxels");
   EXPECT_EQ(brokenBy(withMap(1, {a}), withMap(2 * MS, {})), "");
+  Outcome counted = withMap(1, {a});
+  counted.measured = VoxelSurface::build(0.1, {a, b});
+  EXPECT_EQ(brokenBy(counted, withMap(2 * MS, {a, b})), "") << "it was seen before, if too seldom for an obstacle";
+  EXPECT_EQ(brokenBy(withMap(1, {a}), counted), "") << "what is seen too seldom voids nothing";
   EXPECT_EQ(brokenBy(withMap(1, {a}), withMap(2 * MS, {a}, 1e-3)), "the map is elsewhere");
 }
 
