@@ -377,10 +377,8 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   ObstacleMap next = map;
   next.own = OwnVoxels();
   next.own.seen = map.own.seen;
-  next.own.looked_at =
-      static_cast<std::uint64_t>(std::count_if(look.cubes.begin(), look.cubes.end(), [](const ReachedCube& cube) {
-        return cube.why == ReachedCube::Why::APPEARED;
-      }));
+  const auto appeared = [](const ReachedCube& cube) { return cube.why == ReachedCube::Why::APPEARED; };
+  next.own.looked_at = static_cast<std::uint64_t>(std::count_if(look.cubes.begin(), look.cubes.end(), appeared));
   return withoutOwn(std::move(next), trusted, bodies, trust_first);
 }
 
