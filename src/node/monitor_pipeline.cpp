@@ -305,6 +305,16 @@ std::vector<SpeedBound> MonitorPipeline::speedBounds() const {
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     if (rigid_[b] && !fixed_frame_.empty() && rigid_[b]->frame == fixed_frame_) bounds[b].max_m_s = 0;
   }
+  for (std::size_t i = 0; i < attached_.size(); ++i) {
+    if (!attached_[i]) continue;
+    SpeedBound& bound = bounds[config_.bodies.size() + i];
+    const std::string& frame = rigid_[config_.bodies.size() + i]->frame;
+    for (std::size_t b = 0; b < config_.bodies.size(); ++b) {  // it goes with what carries it
+      if (!rigid_[b] || rigid_[b]->frame != frame) continue;
+      bound.max_m_s = std::max(bound.max_m_s, bounds[b].max_m_s);
+      bound.slows_down = bound.slows_down && bounds[b].slows_down;
+    }
+  }
   return bounds;
 }
 

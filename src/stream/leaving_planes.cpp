@@ -143,7 +143,7 @@ class LeavingPlanes {
     std::vector<Vec3> all;
     const auto add = [&](const Vec3& direction) {
       const double length = direction.norm();
-      if (length > 0 && std::isfinite(length)) all.push_back(direction / length);
+      if (length > tolerance::CLEARANCE_DIRECTION_M && std::isfinite(length)) all.push_back(direction / length);
     };
     add(middleOf(ends_[1].at) - middleOf(ends_[0].at));
     add(middleOf(ends_.back().at) - middleOf(ends_[0].at));

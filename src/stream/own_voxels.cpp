@@ -45,9 +45,12 @@ bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
   for (auto one = stated_.begin(); one != stated_.end();) {
     Stated& voxel = one->second;
     const bool was_its = voxel.owners.has(body);
+    const bool is_over = was_its && std::next(voxel.owners.begin()) == voxel.owners.end();
+    // What it may have hidden is an obstacle where it is shown again.
+    if (is_over && !voxel.shown && voxel.state != VoxelState::OWN) remembered_.push_back({voxel.key, 1});
     voxel.owners.removeIf([&](int owner) { return owner == body; });
     any = any || was_its;
-    one = was_its && voxel.owners.empty() ? stated_.erase(one) : std::next(one);
+    one = is_over ? stated_.erase(one) : std::next(one);
   }
   return before_ && any;
 }

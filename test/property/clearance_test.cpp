@@ -125,6 +125,31 @@ TEST(ClearanceProperty, OfNeedlesIsAsNarrow) {
   }
 }
 
+// An edge or a triangle so small that products of its sides have no digits left, beside a large triangle.
+TEST(ClearanceProperty, OfWhatIsTooSmallForItsSquareHoldsTheTruth) {
+  RandomSource random(20261203);
+  const auto real = [&](double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random); };
+  const auto vector = [&] { return Vec3(real(-1, 1), real(-1, 1), real(-1, 1)); };
+  for (int i = 0; i < 6000; ++i) {
+    const double far = std::pow(10, real(-9, -3)), size = std::pow(10, i % 2 == 0 ? real(-163, -160) : real(-100, -80));
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(real(-3, 3), vector().normalized()));
+    std::array<TrueHull, 2> hulls;
+    for (const Vec3& corner : {Vec3(0, 1, 0), Vec3(2 * far, -real(0.5, 1), 0), Vec3(0, 2, 0)}) {
+      hulls[1].push_back({turn * corner, turn * corner});
+    }
+    hulls[0].push_back({Vec3::Zero(), Vec3::Zero()});
+    while (hulls[0].size() < (i % 4 == 0 ? 2u : 3u)) {
+      const Vec3 corner = size * vector();
+      hulls[0].push_back({corner, corner});
+    }
+    HullPair pair;
+    Nearest nearest;
+    widthOf(hulls, pair, 0, 1e-15, nearest);
+    EXPECT_LE(nearest.direction.norm(), 1 + 1e-14);
+    ASSERT_FALSE(HasFailure()) << "pair " << i;
+  }
+}
+
 TEST(ClearanceProperty, PairsHoldTheTruth) {
   const int pairs = longRun() ? 1000000 : 10000;
   RandomSource random(propertySeed());

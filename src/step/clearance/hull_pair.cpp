@@ -266,12 +266,23 @@ void HullPair::takeMeans(const Simplex& simplex, const Combination& of, Nearest&
   nearest.point = {on_a, on_b};
 }
 
-void HullPair::tryDirection(const Vec3& direction, Nearest& nearest) const {
-  const double norm = direction.norm();
+/// The length of a direction, which is made longer where the square of its length loses digits. 0: it is none.
+static double lengthOf(Vec3& direction) {
+  double length = direction.norm();
+  if (length < tolerance::CLEARANCE_DIRECTION_M) {
+    const double largest = direction.cwiseAbs().maxCoeff();
+    if (!(largest > 0)) return 0;
+    direction /= largest;
+    length = direction.norm();
+  }
+  return length;
+}
+
+void HullPair::tryDirection(Vec3 direction, Nearest& nearest) const {
+  const double norm = lengthOf(direction);
   if (!(norm > 0)) return;
   for (const double sign : {1.0, -1.0}) {
     const Vec3 n = direction * (sign / norm);
-    if (!(n.squaredNorm() < 2)) return;  // of a vector so short that it has no direction
     std::size_t a, b;
     const double lower = along(n, a, b) - tolerance::CLEARANCE;
     if (lower > nearest.lower) nearest.lower = lower, nearest.direction = n;
@@ -295,11 +306,11 @@ Nearest HullPair::at(double t, double wide_m) {
     Combination point = simplex.nearest();
     simplex.reduce(point);
     takeMeans(simplex, point, nearest);
-    const double norm = point.direction.norm();
+    const double norm = lengthOf(point.direction);
     if (!(norm > 0)) break;
     const Vec3 n = point.direction / norm;
     const double lower = along(n, a, b) - tolerance::CLEARANCE;
-    if (lower > nearest.lower && n.squaredNorm() < 2) nearest.lower = lower, nearest.direction = n;
+    if (lower > nearest.lower) nearest.lower = lower, nearest.direction = n;
     if (isNarrow() || simplex.count == 4 || simplex.holds(a, b) || !(point.norm2 < before)) break;
     before = point.norm2;
   }
@@ -314,7 +325,8 @@ void HullPair::tryThrough(std::size_t side, const std::array<std::uint8_t, 2>& e
   const std::array<Vec3, 3> t{of[triangle[0]], of[triangle[1]], of[triangle[2]]};
   const Vec3 n = normalOf(t[0], t[1], t[2]);
   const double from = n.dot(on[edge[0]] - t[0]), to = n.dot(on[edge[1]] - t[0]);
-  if (!(from * to <= 0) || from == to) return;
+  const bool goes_through = from < to ? from <= 0 && to >= 0 : from > to && from >= 0 && to <= 0;
+  if (!goes_through) return;
   const double s = from / (from - to);
   const Vec3 through = (1 - s) * on[edge[0]] + s * on[edge[1]];
   Simplex seen;

@@ -78,7 +78,7 @@ class HullPair {
   double along(const Vec3& direction, std::size_t& a, std::size_t& b) const;
   void improve(Nearest& nearest) const;
   void takeMeans(const Simplex& simplex, const Combination& of, Nearest& nearest) const;
-  void tryDirection(const Vec3& direction, Nearest& nearest) const;
+  void tryDirection(Vec3 direction, Nearest& nearest) const;
   void tryThrough(std::size_t side, const std::array<std::uint8_t, 2>& edge,
                   const std::array<std::uint8_t, 3>& triangle, Nearest& nearest) const;
 

@@ -121,7 +121,7 @@ inline double squaredGap(const StepBox& a, const StepBox& b, int first) {
       below = std::min(below, b.lo[axis] - a.hi[axis]);
     }
     const double gap = std::max(std::max(above, below), 0.0);
-    sum += gap * gap;
+    sum += gap > tolerance::CLEARANCE_DIRECTION_M ? gap * gap : 0;  // else the square may be rounded up
   }
   return sum * (1 - tolerance::CLEARANCE_BOX);
 }

@@ -94,7 +94,7 @@ inline double squaredGap(const TurnedBox& a, const TurnedBox& b, double slack_m,
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
     const double gap = std::max(std::max(above[k], below[k]) - slack_m, 0.0);
-    sum += gap * gap;
+    sum += gap > tolerance::CLEARANCE_DIRECTION_M ? gap * gap : 0;  // else the square may be rounded up
   }
   return sum * (1 - tolerance::CLEARANCE_BOX);
 }

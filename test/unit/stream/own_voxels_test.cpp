@@ -530,22 +530,25 @@ class OwnVoxelsOfTwo : public OwnVoxels {
  protected:
   /// A cup below the cloth, of which a map shows 25 voxels.
   void SetUp() override {
-    Body cup = named("cup");
-    cup.own_voxels_m = 0.05;
-    MonitorOptions options = loose();
-    options.detector.obstacle_expected = true;
-    options.own_voxels_lag_s = 0;
-    monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), cup});
-    const auto feedBoth = [&](StampNs stamp_ns) {
-      monitor_->push(1, sheet(stamp_ns, 0.55), NOW);
-      return feed(stamp_ns, 0.95);
-    };
+    startBoth();
     map(-100 * MS, slab(1));
     feedBoth(0);
     map(0, slab(1));
     feedBoth(100 * MS);
     map(150 * MS, slab(1) + voxelsOf(0.55));
     ASSERT_EQ(own(feedBoth(200 * MS)), 25u);
+  }
+  void startBoth() {
+    Body cup = named("cup");
+    cup.own_voxels_m = 0.05;
+    MonitorOptions options = loose();
+    options.detector.obstacle_expected = true;
+    options.own_voxels_lag_s = 0;
+    monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), cup});
+  }
+  Outcome feedBoth(StampNs stamp_ns) {
+    monitor_->push(1, sheet(stamp_ns, 0.55), NOW);
+    return feed(stamp_ns, 0.95);
   }
   void removeCup() { monitor_->setBody(1, named("nothing")); }
   /// The cloth, onto where the cup was.
@@ -564,6 +567,25 @@ TEST_F(OwnVoxelsOfTwo, OfABodyThatIsRemovedAreObstaclesAtOnce) {
   EXPECT_TRUE(onto.step->map.own.excluded.empty());
   EXPECT_EQ(assuranceOf(onto).touching, Touching::NEW);
   EXPECT_EQ(onto.step->map.surface->leafCount(), 125u) << "the floor and what stood there";
+}
+
+// What was in doubt beside the cup was hidden by it; once it was removed the cloth had it for its own.
+TEST_F(OwnVoxelsOfTwo, WhatItMayHaveHiddenIsAnObstacleOnceItIsRemoved) {
+  startBoth();
+  feedBoth(0);
+  map(0, slab(1) + voxelsOf(0.55));
+  ASSERT_EQ(doubted(feedBoth(100 * MS)), 25u);
+  map(150 * MS, slab(1));
+  feedBoth(200 * MS);
+  removeCup();
+  feedOntoIt();
+  map(350 * MS, slab(1) + voxelsOf(0.55));
+  monitor_->push(1, {400 * MS, share(Topology::fromTriangles(0, {})), {}}, NOW);
+  const Outcome onto = feed(400 * MS, 0.55);
+  ASSERT_EQ(onto.status, StepStatus::OK) << onto.reason;
+  EXPECT_EQ(own(onto), 0u);
+  EXPECT_NE(assuranceOf(onto).touching, Touching::NONE);
+  EXPECT_FALSE(assuranceOf(onto).clear());
 }
 
 // The removal fails at one allocation after the other, and is tried again: there are the obstacles, or no map.

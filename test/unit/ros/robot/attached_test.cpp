@@ -85,6 +85,28 @@ TEST_F(Attached, APromiseIsVoidOnceSomethingIsTakenLetGoOrForgotten) {
              [&] { pipeline().robotChanged({"d"}), pipeline().robotChanged({}); });
 }
 
+// A tray that nobody slows down carried a cup that was taken for as slow as the cloth.
+TEST_F(Attached, WhatIsCarriedIsAsFastAsWhatCarriesIt) {
+  const std::string file = (folder_ / "tray.obj").string();
+  std::ofstream(file) << "v 0.2 0.2 0\nv 0.21 0.2 0.05\nv 0.2 0.21 0.05\nf 1 2 3\n";
+  start(robotScene("",
+                   "effects: {octomap: 'off'}, max_speed_m_s: 0.5, bodies: {cloth: {topic: cloth}, tray: {"
+                   "max_speed_m_s: 2.0, slows_down: false, rigid: {frame: tool, mesh: " +
+                       file + "}}}"));
+  feed(1, 0, 0.8f);
+  Request request = plate();
+  request.link = "tray";
+  attach(request);
+  EXPECT_EQ(pipeline().speedBounds().back().max_m_s, 2);
+  EXPECT_FALSE(pipeline().speedBounds().back().slows_down);
+  feed(1.1, 0, 0.8f);
+  pipeline().detach("plate");
+  EXPECT_EQ(pipeline().speedBounds().back().max_m_s, 2) << "until it is let go in a step";
+  feed(1.2, 0, 0.8f);
+  EXPECT_EQ(pipeline().speedBounds().back().max_m_s, 0.5);
+  EXPECT_TRUE(pipeline().speedBounds().back().slows_down);
+}
+
 // Frames that were on their way when it was let go show it held.
 TEST_F(Attached, StepsThatBeganBeforeTheCallProveNothing) {
   start();
