@@ -538,13 +538,14 @@ class OwnVoxelsOfTwo : public OwnVoxels {
     map(150 * MS, slab(1) + voxelsOf(0.55));
     ASSERT_EQ(own(feedBoth(200 * MS)), 25u);
   }
-  void startBoth() {
-    Body cup = named("cup");
+  void startBoth(double reach_of_cloth_m = 0) {
+    Body cup = named("cup"), cloth = named("cloth");
+    cloth.own_voxels_m = reach_of_cloth_m;
     cup.own_voxels_m = 0.05;
     MonitorOptions options = loose();
     options.detector.obstacle_expected = true;
     options.own_voxels_lag_s = 0;
-    monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{named("cloth"), cup});
+    monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{cloth, cup});
   }
   Outcome feedBoth(StampNs stamp_ns) {
     monitor_->push(1, sheet(stamp_ns, 0.55), NOW);
@@ -571,7 +572,7 @@ TEST_F(OwnVoxelsOfTwo, OfABodyThatIsRemovedAreObstaclesAtOnce) {
 
 // What was in doubt beside the cup was hidden by it; once it was removed the cloth had it for its own.
 TEST_F(OwnVoxelsOfTwo, WhatItMayHaveHiddenIsAnObstacleOnceItIsRemoved) {
-  startBoth();
+  startBoth(0.05);
   feedBoth(0);
   map(0, slab(1) + voxelsOf(0.55));
   ASSERT_EQ(doubted(feedBoth(100 * MS)), 25u);
