@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "step/clearance/hull_pair.h"
+#include "step/clearance/step_box.h"
 #include "step/parts.h"
 #include "support/clearance_truth.h"
 #include "support/closed_meshes.h"
@@ -147,6 +148,14 @@ TEST(ClearanceProperty, OfWhatIsTooSmallForItsSquareHoldsTheTruth) {
     widthOf(hulls, pair, 0, 1e-15, nearest);
     EXPECT_LE(nearest.direction.norm(), 1 + 1e-14);
     ASSERT_FALSE(HasFailure()) << "pair " << i;
+  }
+}
+
+TEST(ClearanceProperty, OfBoxesWhoseGapHasNoSquareIsNotRoundedUp) {
+  for (int i = 0; i <= 600; ++i) {
+    const double gap = std::pow(10, -164 + i / 50.0);
+    const Vec3 one = Vec3::Zero(), other(gap, 0, 0);
+    EXPECT_LE(apartByBoxes(StepBox::still(one.data(), one.data()), StepBox::still(other.data(), other.data())), gap);
   }
 }
 
