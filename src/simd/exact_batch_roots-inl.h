@@ -83,6 +83,14 @@ HWY_INLINE void onPlanes(SplitBlock& roots, const Do& act) {
   act(roots.current);
 }
 
+template <class Do>
+HWY_INLINE void onPlanes(HardBlock& pairs, const Do& act) {
+  onPlanes(static_cast<RootBlock&>(pairs), act);
+  for (int k = 0; k < MOTION_PLANES; ++k) act(pairs.rest.motion[k]);
+  for (double* plane : {pairs.from, pairs.width, pairs.smallest, pairs.lo, pairs.hi, pairs.at_lo}) act(plane);
+  for (double* plane : {pairs.outcome, pairs.root_lo, pairs.root_hi}) act(plane);
+}
+
 /// Copies of the last pair up to a whole vector.
 struct FillUp {
   std::size_t count;

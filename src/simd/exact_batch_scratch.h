@@ -54,7 +54,10 @@ struct alignas(64) RootBlock {
 /// Pairs that go on to subdivision, with what their coefficients are made of anew.
 struct HardBlock : RootBlock {
   const BatchInput* input = nullptr;
-  MotionBlock rest;  ///< what rounding took from the differences
+  MotionBlock rest;        ///< what rounding took from the differences
+  BatchPlane from, width;  ///< of the interval in work, in [0,1]
+  BatchPlane smallest;     ///< no interval is narrower
+  BatchPlane piece;        ///< PIECE_* of it
 };
 
 /// The same with the step split at the extrema of f.
@@ -80,7 +83,7 @@ struct FrontTable {
 };
 inline constexpr FrontTable FRONT_TABLE;
 
-/// All of it: about 90 kilobytes.
+/// All of it: about 90 kilobytes, and 35 for the roots that subdivision refines.
 struct BatchScratch {
   MotionBlock motion;
   RootBlock single;    ///< certainly one root in the whole step

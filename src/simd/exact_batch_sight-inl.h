@@ -116,8 +116,7 @@ HWY_INLINE void directedInsideTest(const HardBlock& pairs, std::size_t i, V m, V
   }
 }
 
-/// Asks the test above about one vector of certified brackets, in lanes that certify() left uncertain. Of lanes without
-/// a bracket the outcome means nothing then.
+/// Asks the test above about one vector of certified brackets, in lanes that certify() left uncertain.
 template <BatchKind KIND>
 HWY_NOINLINE void settleDirected(HardBlock& pairs, std::size_t i, double cells) {
   const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i), outcome = load(pairs.outcome, i);

@@ -117,75 +117,160 @@ HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
   return choose(rests, constant(1), choose(hn::And(at_start, at_end), constant(SMALLEST_INTERVAL_AT_ENDS), one_end));
 }
 
-/// One vector, intervals from left to right: each is proved free (no root, or the features apart), or holds one root,
-/// which is refined, or is halved. Stops at the first certain contact.
+/// What one vector of intervals holds: certainly nothing, where no root is or the features are apart, one root, or
+/// perhaps more. The lanes with one root.
 template <BatchKind KIND>
-HWY_INLINE void subdivideVector(HardBlock& pairs, std::size_t i, double cells) {
-  const Tag d;
-  const V one = constant(1), zero = hn::Zero(d), third = constant(1.0 / 3), half = constant(0.5);
-  const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
-  const V f1 = hn::Mul(load(pairs.coefficient[1], i), third), f2 = hn::Mul(load(pairs.coefficient[2], i), third);
-  const V smallest = smallestInterval(pairs, i);
-  V from = zero, width = one, result = constant(ROOT_PENDING), kept_lo = zero, kept_hi = zero;
-  for (int k = 0; k < MAX_INTERVALS; ++k) {
-    const M active = hn::Eq(result, constant(ROOT_PENDING));
-    if (hn::AllFalse(d, active)) break;
-    const V a = warp(from), b = warp(hn::Add(from, width));
-    V c0, c1, c2, c3;
-    overPiece(f0, f1, f2, f3, a, b, c0, c1, c2, c3);
-    const V piece = pieceOf<true, false>(c0, c1, c2, c3, error);
-    M free = hn::Eq(piece, constant(PIECE_FREE));
-    if (!hn::AllTrue(d, hn::Or(free, hn::Not(active)))) free = hn::Or(free, apart<KIND>(pairs, i, a, b));
-    const M has_root = hn::And(active, hn::AndNot(free, hn::Eq(piece, constant(PIECE_ROOT))));
-    if (!hn::AllFalse(d, has_root)) {
-      store(a, pairs.lo, i), store(b, pairs.hi, i), store(c0, pairs.at_lo, i);
-      store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
-      approximate<false, PATIENT_STEPS>(pairs, i);
-      certify<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
-      const V lo = load(pairs.root_lo, i), hi = load(pairs.root_hi, i);
-      const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
-      V outcome = load(pairs.outcome, i);
-      const M open = hn::And(hn::And(has_root, narrow), hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
-      if (!hn::AllFalse(d, open)) {
-        settleDirected<KIND>(pairs, i, cells);
-        outcome = choose(open, load(pairs.outcome, i), outcome);
-      }
-      const M contact =
-          hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
-      free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
-      result = choose(contact, outcome, result);
-      const M uncertain = hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN)));
-      if (!hn::AllFalse(d, uncertain)) free = hn::Or(free, hn::And(uncertain, apart<KIND>(pairs, i, lo, hi)));
-      // What stays uncertain in a narrow bracket stays so in every interval around it.
-      const M stuck = hn::And(hn::AndNot(free, uncertain), narrow);
-      result = choose(stuck, constant(ROOT_UNCERTAIN), result);
-      kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);
-      kept_hi = choose(contact, load(pairs.root_hi, i), kept_hi);
-    }
-    const V next = hn::Add(from, width), wider = hn::Add(width, width);
-    const M ascend = hn::And(hn::Eq(hn::Mul(floorOf(hn::Div(next, wider)), wider), next), hn::Lt(next, one));
-    const M still = hn::Eq(result, constant(ROOT_PENDING));
-    result = choose(hn::And(still, hn::And(free, hn::Ge(next, one))), constant(ROOT_NO_CONTACT), result);
-    from = choose(free, next, from);
-    width = choose(free, choose(ascend, wider, width), hn::Mul(half, width));
-    result = choose(hn::And(hn::Eq(result, constant(ROOT_PENDING)), hn::Lt(width, smallest)), constant(ROOT_UNCERTAIN),
-                    result);
+HWY_INLINE unsigned lookAt(HardBlock& hard, std::size_t i) {
+  const V third = constant(1.0 / 3), from = load(hard.from, i);
+  const V f0 = load(hard.coefficient[0], i), f3 = load(hard.coefficient[3], i), error = load(hard.error, i);
+  const V f1 = hn::Mul(load(hard.coefficient[1], i), third), f2 = hn::Mul(load(hard.coefficient[2], i), third);
+  const V a = warp(from), b = warp(hn::Add(from, load(hard.width, i)));
+  V c0, c1, c2, c3;
+  overPiece(f0, f1, f2, f3, a, b, c0, c1, c2, c3);
+  V piece = pieceOf<true, false>(c0, c1, c2, c3, error);
+  if (!hn::AllTrue(Tag(), hn::Eq(piece, constant(PIECE_FREE)))) {
+    piece = choose(apart<KIND>(hard, i, a, b), constant(PIECE_FREE), piece);
   }
-  result = choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result);
-  store(result, pairs.outcome, i);
-  const bool edges = KIND == BatchKind::EDGE_EDGE;
-  if (edges && !hn::AllFalse(d, hn::Eq(result, constant(ROOT_UNCERTAIN)))) settleParallel(pairs, i);
-  store(kept_lo, pairs.root_lo, i);
-  store(kept_hi, pairs.root_hi, i);
+  store(piece, hard.piece, i);
+  store(a, hard.lo, i), store(b, hard.hi, i), store(c0, hard.at_lo, i);
+  return bitsOf(hn::Eq(piece, constant(PIECE_ROOT)));
 }
 
+/// One vector of certified brackets that leave it open whether the features meet: no contact, a contact, uncertain in
+/// every interval around it, or not bracketed closely enough.
+template <BatchKind KIND>
+HWY_INLINE void lookCloser(HardBlock& roots, std::size_t i, double cells) {
+  const V lo = load(roots.root_lo, i), hi = load(roots.root_hi, i), unknown = constant(ROOT_UNCERTAIN);
+  const M narrow = hn::Le(hn::Sub(hi, lo), constant(NARROW_BRACKET));
+  V outcome = unknown;
+  if (!hn::AllFalse(Tag(), narrow)) {
+    settleDirected<KIND>(roots, i, cells);
+    outcome = choose(narrow, load(roots.outcome, i), unknown);
+  }
+  const M open = hn::Eq(outcome, unknown);
+  if (!hn::AllFalse(Tag(), open)) {
+    const M free = hn::And(open, apart<KIND>(roots, i, lo, hi));
+    outcome = choose(hn::AndNot(narrow, open), constant(ROOT_NOT_BRACKETED), outcome);
+    outcome = choose(free, constant(ROOT_NO_CONTACT), outcome);
+  }
+  store(outcome, roots.outcome, i);
+}
+
+/// Tells a pair what became of the root in its interval.
+HWY_INLINE void tell(const HardBlock& roots, std::size_t j, HardBlock& hard) {
+  const std::size_t lane = roots.pair[j];
+  const double outcome = roots.outcome[j];
+  if (outcome == ROOT_NO_CONTACT) hard.piece[lane] = PIECE_FREE;
+  if (outcome == ROOT_NO_CONTACT || outcome == ROOT_NOT_BRACKETED) return;
+  hard.outcome[lane] = outcome;
+  if (outcome == ROOT_UNCERTAIN) return;
+  hard.root_lo[lane] = roots.root_lo[j];
+  hard.root_hi[lane] = roots.root_hi[j];
+}
+
+/// Refines the roots of those intervals that have one. `pair` of a root is the lane of `hard` that it comes from.
+template <BatchKind KIND>
+HWY_INLINE void refineRoots(HardBlock& roots, HardBlock& hard, double cells) {
+  fillUp(roots);
+  refine<true, KIND, false, PATIENT_STEPS>(roots, cells);
+  std::size_t open = 0;
+  for (std::size_t j = 0; j < roots.count; ++j) {
+    if (roots.outcome[j] != ROOT_UNCERTAIN) {
+      tell(roots, j, hard);
+      continue;
+    }
+    if (open != j) copyPair(roots, j, roots, open);
+    for (int k = 0; k < MOTION_PLANES; ++k) roots.rest.motion[k][open] = hard.rest.motion[k][roots.pair[j]];
+    roots.root_lo[open] = roots.root_lo[j], roots.root_hi[open] = roots.root_hi[j];
+    roots.outcome[open++] = ROOT_UNCERTAIN;
+  }
+  roots.count = open;
+  fillUp(roots);
+  for (std::size_t i = 0; i < roots.count; i += lanes()) lookCloser<KIND>(roots, i, cells);
+  for (std::size_t j = 0; j < roots.count; ++j) tell(roots, j, hard);
+  roots.count = 0;
+}
+
+/// Goes on one vector of pairs to the next interval, of a free one, or to the left half.
+HWY_INLINE void advance(HardBlock& hard, std::size_t i, bool is_last) {
+  const V one = constant(1), from = load(hard.from, i), width = load(hard.width, i), pending = constant(ROOT_PENDING);
+  const M free = hn::Eq(load(hard.piece, i), constant(PIECE_FREE));
+  V result = load(hard.outcome, i);
+  const V next = hn::Add(from, width), wider = hn::Add(width, width);
+  const M ascend = hn::And(hn::Eq(hn::Mul(floorOf(hn::Div(next, wider)), wider), next), hn::Lt(next, one));
+  const M done = hn::And(hn::Eq(result, pending), hn::And(free, hn::Ge(next, one)));
+  result = choose(done, constant(ROOT_NO_CONTACT), result);
+  const V then = choose(free, choose(ascend, wider, width), hn::Mul(constant(0.5), width));
+  const M given_up = is_last ? hn::FirstN(Tag(), lanes()) : hn::Lt(then, load(hard.smallest, i));
+  result = choose(hn::And(hn::Eq(result, pending), given_up), constant(ROOT_UNCERTAIN), result);
+  store(choose(free, next, from), hard.from, i);
+  store(then, hard.width, i);
+  store(result, hard.outcome, i);
+}
+
+/// Writes out what is settled, and moves the others together. Of edges `parallel` gets those that are uncertain.
+template <BatchKind KIND>
+HWY_INLINE void takeOut(HardBlock& hard, HardBlock& parallel, double cells, const BatchOutput& out) {
+  std::size_t pending = 0;
+  for (std::size_t i = 0; i < hard.count; i += lanes()) {
+    const unsigned all = hard.count - i < lanes() ? (1u << (hard.count - i)) - 1 : (1u << lanes()) - 1;
+    const unsigned waiting = all & bitsOf(hn::Eq(load(hard.outcome, i), constant(ROOT_PENDING)));
+    for (unsigned bits = all & ~waiting; bits != 0; bits &= bits - 1) {
+      const std::size_t j = i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
+      if (KIND == BatchKind::VERTEX_FACE || hard.outcome[j] != ROOT_UNCERTAIN) {
+        writeOut(hard, j, cells, out);
+        continue;
+      }
+      copyPair(hard, j, parallel, parallel.count);
+      for (int k = 0; k < MOTION_PLANES; ++k) parallel.rest.motion[k][parallel.count] = hard.rest.motion[k][j];
+      parallel.root_lo[parallel.count] = parallel.root_hi[parallel.count] = 0;
+      parallel.outcome[parallel.count++] = ROOT_UNCERTAIN;
+    }
+    if (waiting == 0) continue;
+    if (waiting != all || pending != i) {
+      onPlanes(hard, MoveTogether{hn::SetTableIndices(Tag(), FRONT_TABLE.row[waiting]), i, pending});
+    }
+    for (unsigned bits = waiting; bits != 0; bits &= bits - 1) {
+      hard.pair[pending++] = hard.pair[i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)];
+    }
+  }
+  hard.count = pending;
+  fillUp(hard);
+  fillUp(parallel);
+  for (std::size_t i = 0; i < parallel.count; i += lanes()) settleParallel(parallel, i);
+  for (std::size_t j = 0; j < parallel.count; ++j) writeOut(parallel, j, cells, out);
+  parallel.count = 0;
+}
+
+/// Intervals from left to right: each is proved free, or holds one root, which is refined, or is halved. A pair is
+/// settled by its first certain contact. All pairs look at one interval in turn; roots are refined side by side.
 template <BatchKind KIND>
 void subdivideAll(HardBlock& hard, double cells, const BatchOutput& out) {
+  if (hard.count == 0) return;
+  HardBlock roots;
   for (std::size_t j = hard.count; j % lanes() != 0; ++j) copyPair(hard, hard.count - 1, hard, j);
   sharpen<KIND>(hard);
-  for (std::size_t i = 0; i < hard.count; i += lanes()) subdivideVector<KIND>(hard, i, cells);
-  for (std::size_t j = 0; j < hard.count; ++j) writeOut(hard, j, cells, out);
-  hard.count = 0;
+  const V zero = hn::Zero(Tag());
+  for (std::size_t i = 0; i < hard.count; i += lanes()) {
+    store(zero, hard.from, i), store(constant(1), hard.width, i), store(smallestInterval(hard, i), hard.smallest, i);
+    store(constant(ROOT_PENDING), hard.outcome, i), store(zero, hard.root_lo, i), store(zero, hard.root_hi, i);
+  }
+  for (int k = 1; hard.count != 0; ++k) {
+    for (std::size_t i = 0; i < hard.count; i += lanes()) {
+      for (unsigned bits = lookAt<KIND>(hard, i); bits != 0; bits &= bits - 1) {
+        const std::size_t j = i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
+        if (j >= hard.count) break;
+        copyPair(hard, j, roots, roots.count);
+        roots.lo[roots.count] = hard.lo[j], roots.hi[roots.count] = hard.hi[j],
+        roots.at_lo[roots.count] = hard.at_lo[j];
+        roots.outcome[roots.count] = ROOT_PENDING;
+        roots.pair[roots.count++] = static_cast<std::uint32_t>(j);
+      }
+    }
+    if (roots.count != 0) refineRoots<KIND>(roots, hard, cells);
+    for (std::size_t i = 0; i < hard.count; i += lanes()) advance(hard, i, k == MAX_INTERVALS);
+    takeOut<KIND>(hard, roots, cells, out);
+  }
 }
 
 }  // namespace HWY_NAMESPACE
