@@ -348,6 +348,25 @@ class Rigid(Stream):
         return False
 
 
+class LetGo(Rigid):
+    """What a frame carried, where it was let go."""
+    moves = False
+
+    def __init__(self, track, stamp):
+        super().__init__(track.name, track.mesh, track.transforms, track.fixed)
+        self.stamp = stamp
+
+    def knots(self, start, end):
+        return []
+
+    @once
+    def at(self, stamp, start, end):
+        return carried(self.transforms.pose(self.mesh.frame, self.fixed, self.stamp), self.mesh.positions)
+
+    def turns(self, start, end):
+        return False
+
+
 class Held(Stream):
     """A static body: its newest frame holds at all times, and goes along with the frame of reference that it came in."""
     moves = False

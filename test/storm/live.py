@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""What the live node says of a world: live.py FOLDER, which has world.bag and params.yaml, and gets out.bag.
+"""What the live node says of a world: live.py FOLDER, which has world.bag, params.yaml and calls.yaml, and gets out.bag.
 
 The messages come in their order, each on a /clock that stands at the bag's time of it until the node has taken it: what it says then was said with all
 that had come by that time, and with nothing else."""
+import json
 import os
 import pathlib
 import subprocess
@@ -14,6 +15,7 @@ import rosbag
 import rospy
 import yaml
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -33,9 +35,22 @@ def said_topics():
             'patches': PatchArray, 'events': PatchEvent, 'along_path': AlongPath, 'limits': Limits}
 
 
+def called(service, name, link, mesh):
+    """Whether the node did what it was called for."""
+    from deformable_ccd.srv import AttachObject, AttachObjectRequest, Named
+    from geometry_msgs.msg import Pose, Quaternion, Vector3
+    if service == 'attach':
+        request = AttachObjectRequest(name=name, link=link, mesh=mesh, scale=Vector3(1, 1, 1), pose=Pose(orientation=Quaternion(w=1)))
+        return rospy.ServiceProxy(NODE + '/attach', AttachObject)(request).success
+    if service == 'reset':
+        return rospy.ServiceProxy(NODE + '/reset', Trigger)().success
+    return rospy.ServiceProxy(NODE + '/' + service, Named)(name).success
+
+
 def play(folder):
     with rosbag.Bag(str(folder / 'world.bag')) as bag:
         rows = [(topic, message, at.to_nsec()) for topic, message, at in bag.read_messages()]
+    calls = [(None, call, call.pop('at')) for call in yaml.safe_load((folder / 'calls.yaml').read_text())]
     said, now = [], [rows[0][2]]
     rospy.init_node('world', anonymous=True, disable_signals=True, disable_rostime=True)
     clock = rospy.Publisher('/clock', Clock, queue_size=10, latch=True)
@@ -57,13 +72,18 @@ def play(folder):
         taken()  # by the worker, once it has nothing else to do
         time.sleep(TAKEN_S)
 
-    for topic, message, at_ns in rows:
+    for topic, message, at_ns in sorted(rows + calls, key=lambda row: row[2]):
         while at_ns - now[0] > 2 * TICK_NS:  # what waits in vain is given up in between
             tell(now[0] + TICK_NS)
             wait()
         tell(at_ns)
         wait()
-        publishers[topic].publish(message)
+        if topic:
+            publishers[topic].publish(message)
+        else:
+            now[0] += 10  # what was said before is not taken for what was said after
+            if called(**message):
+                said.append((NODE + '/called', String(json.dumps({**message, 'at': at_ns})), now[0] - 1))
         wait()
     for at_ns in range(rows[-1][2] + TICK_NS, rows[-1][2] + AFTER_NS, TICK_NS):
         tell(at_ns)

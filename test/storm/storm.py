@@ -76,6 +76,8 @@ def judge(world, folder, live=False):
     params.write_text(yaml.safe_dump(world.params))
     (folder / 'finger.obj').write_text(worlds.FINGER_OBJ)
     (folder / 'arm.urdf').write_text(worlds.ROBOT)
+    (folder / 'rod.obj').write_text(worlds.ROD_OBJ)
+    (folder / 'calls.yaml').write_text(yaml.safe_dump(getattr(world, 'calls', [])))
     command = [sys.executable, str(HERE / 'live.py'), str(folder)] if live else [
         str(TOOLS / 'analyze_bag'), str(bag), '--params', str(params), '-o', str(out), '--report', str(folder / 'report'), '--quiet']
     ran = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -18,6 +18,7 @@ from visualization_msgs.msg import Marker
 NS, START = 10 ** 9, 1000 * 10 ** 9
 FINGER = np.array([[-.03, -.03, -.03], [.03, -.03, -.03], [0, .03, -.03], [0, 0, .03]])
 FINGER_OBJ = ''.join('v %r %r %r\n' % tuple(p) for p in FINGER.tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
+ROD_OBJ = ''.join('v %r %r %r\n' % tuple(p) for p in (FINGER + (0, 0, .09)).tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
 ROBOT = ('<robot name="arm"><link name="base"/><link name="tool"><collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link>'
          '<link name="wrist"><collision><origin xyz="0 0 0.1" rpy="0.3 0 0"/><geometry><cylinder radius="0.03" length="0.06"/></geometry></collision></link>'
          '<joint name="j" type="floating"><parent link="base"/><child link="tool"/></joint><joint name="swing" type="revolute"><parent link="base"/>'
@@ -125,6 +126,7 @@ class World:
                 self.fault(kind)
         self.ahead(random.Random(seed + 2 * NS))
         self.handed_over(random.Random(seed + 4 * NS))
+        self.services(random.Random(seed + 5 * NS))
         self.rows.sort(key=lambda row: row[2])
         for before, row in zip(self.rows, self.rows[1:]):  # no two at once
             row[2] = max(row[2], before[2] + 1000)
@@ -447,6 +449,18 @@ class World:
         for one in mine[at:at + r.choice([1, 3, len(mine)])]:
             one.header.frame_id = parent
         self.faults.append('%s is handed over to %s at %d' % (child, parent, at))
+
+    def services(self, r):
+        """What is called while it runs, where a node is there to be called: phases, an object that comes and goes, resets."""
+        p, self.calls = self.params, []
+        phases = sorted({row['phase'] for row in p.get('expected_contacts', []) if 'phase' in row})
+        links = ['finger'] * ('finger' in p['bodies']) + ['tool', 'wrist'] * ('robot' in p)
+        wanted = ['set_phase', 'set_phase'] * bool(phases) + ['reset'] * (r.random() < .2)
+        if links and 'own_voxels_m' not in p and 'intent' not in p:
+            wanted = ['attach', *wanted, r.choice(['detach', 'remove']), r.choice(['remove', 'attach'])]
+        for service, at in zip(wanted, sorted(r.uniform(0, self.seconds) for _ in wanted)):
+            name = r.choice(['', *phases]) if service == 'set_phase' else 'rod'
+            self.calls.append({'at': self.ns(at), 'service': service, 'name': name, 'link': r.choice(links or ['']), 'mesh': self.folder + '/rod.obj'})
 
     def options(self):
         r, p = self.r, self.params
