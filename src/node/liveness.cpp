@@ -45,6 +45,7 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
   if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
   lacked_map_ = false;
+  while (!maps_.empty() && maps_.front().name <= maps_settled_) maps_.pop_front();
   for (auto& [body, frames] : statics_) frames.answered = frames.in_use;
 }
 
@@ -55,7 +56,7 @@ void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
 void Liveness::mapSettled(std::int64_t name, std::int64_t placed) {
   lacked_map_ = lacked_map_ || lacksMap();
   maps_placed_ = placed;
-  while (!maps_.empty() && maps_.front().name <= name) maps_.pop_front();
+  maps_settled_ = name;
 }
 
 void Liveness::staticCame(const std::string& body, std::uint64_t number, std::int64_t now_ns) {

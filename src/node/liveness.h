@@ -39,10 +39,11 @@ class Liveness {
   /// It has its outcome, whatever that says, and so do those before it. `map_age_s`: of the map in use at the frame's
   /// stamp; negative: none was used.
   void outcome(std::int64_t name, double map_age_s, std::int64_t now_ns);
-  /// A map came, under a name as frames have. It and all before it are in use, gave way to it or were refused.
+  /// A map came, under a name as frames have. It has answer_timeout_s until an answer has used it.
   void mapCame(std::int64_t name, std::int64_t now_ns);
-  /// Those up to `placed` have a place, and are in use from the first frame on that is not before their stamp; they
-  /// have answer_timeout_s for that. An answer that was given without one of them stays no proof.
+  /// The next answer uses the map `name`; those before it gave way to it or were refused. Those up to `placed` have a
+  /// place, and are in use from the first frame on that is not before their stamp. An answer that was given without one
+  /// of them stays no proof.
   void mapSettled(std::int64_t name, std::int64_t placed);
 
   /// Frames of a static body came, up to this number: what was said is void until a step that used the last one is
@@ -77,8 +78,8 @@ class Liveness {
   LivenessLimits limits_;
   std::deque<Frame> open_;  // without an outcome; at most a few thousand, of which the oldest counts
   Frame newest_{0, NEVER};
-  std::deque<Frame> maps_;  // not in use; at most as many
-  std::int64_t maps_placed_ = NEVER;
+  std::deque<Frame> maps_;  // in no answer; at most as many
+  std::int64_t maps_placed_ = NEVER, maps_settled_ = NEVER;
   bool lacked_map_ = false;                              // lacksMap() held until that map got its place
   std::int64_t answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
