@@ -74,7 +74,7 @@ void MonitorPipeline::detach(const std::string& name) {
   }
   voidWhatWasSaid("object '" + name + "' was detached");
   attached_[number]->held = false;
-  rigid_[config_.bodies.size() + number]->let_go_ns = changedAt(newest_ns_);
+  rigid_[config_.bodies.size() + number]->let_go_ns = stampOf(call_);
   expectNow(config_.phase);
 }
 

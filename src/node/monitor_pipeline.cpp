@@ -60,6 +60,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
   waiting.since_ns = message.since_ns < 0 ? message.arrival_ns : message.since_ns;
+  waiting.receipt_ns = message.receipt_ns;
   const auto refuse = [&](StepStatus status, const std::string& reason) {
     monitor_->countReceived(body);
     skip(body, status, message.receipt_ns, message.arrival_ns, reason);
@@ -101,8 +102,10 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
   const double back_s = sources_[body].hear(waiting.mesh, message);
-  if (body == config_.monitor.clock_body && back_s > tolerance::LATE_FRAME_S)
+  if (body == config_.monitor.clock_body && back_s > tolerance::LATE_FRAME_S) {
+    settleLetGo(waiting.mesh.stamp_ns);
     transforms_.beginAnew(waiting.mesh.stamp_ns);
+  }
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changes;
   points_no_measurement_ += waiting.mesh.no_measurement;
@@ -141,8 +144,8 @@ void MonitorPipeline::voidWhatWasSaid(const std::string& why) {
   promises_.revoke(why);
   answered_.reset();
   changed_ = why;
-  changed_ns_ = call_ns_;
-  newest_ns_ = sources_[config_.monitor.clock_body].stamp_ns;
+  changed_at_ = call_;
+  since_ns_ = call_.arrival_ns < 0 && call_.stamp_ns == 0 ? stampOf(call_) : NOT_YET;
   if (voided_.empty()) voided_ = why;  // the first reason: what else changes follows from it
 }
 

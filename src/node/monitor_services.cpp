@@ -36,10 +36,15 @@ ros::ServiceServer advertise(ros::NodeHandle& node, const char* name, const Answ
 
 }  // namespace
 
+/// A call counts from when it is made, however long the worker is busy.
+MonitorPipeline::CallTime CollisionMonitor::Impl::callTime() {
+  return {static_cast<StampNs>(ros::Time::now().toNSec()), steadyNs()};
+}
+
 /// What the call made void is so before its caller hears that it was done.
 Reply CollisionMonitor::Impl::ask(const std::function<Reply()>& run) {
-  const auto command = [this, run] {
-    pipeline.callsComeAt(static_cast<StampNs>(ros::Time::now().toNSec()));
+  const auto command = [this, run, now = callTime()] {
+    pipeline.callsComeAt(now);
     const Reply reply = run();
     publishVoided();
     return reply;

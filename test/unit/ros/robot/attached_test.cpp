@@ -114,7 +114,7 @@ TEST_F(Attached, StepsThatBeganBeforeTheCallProveNothing) {
   attach(plate());
   feed(1.1, 0, 0.8f);
   ASSERT_TRUE((feed(1.2, 0, 0.8f), said().clear())) << describe(said());
-  pipeline().callsComeAt(1'450'000'000);
+  pipeline().callsComeAt({1'450'000'000});
   pipeline().detach("plate");
   for (const double stamp_s : {1.3, 1.4, 1.5, 1.6, 1.7}) {
     feed(stamp_s, 0, 0.8f);
@@ -145,7 +145,7 @@ TEST_F(Attached, WhatIsLetGoStaysWhereItsLinkWasAtTheCall) {
   feed(1, 0, 0.8f);
   attach(plate());
   feed(1.1, 0, 0.8f);
-  pipeline().callsComeAt(1'250'000'000);
+  pipeline().callsComeAt({1'250'000'000});
   pipeline().detach("plate");
   feed(1.2, 0.1, 0.8f);
   EXPECT_NEAR(heightOf(2), 0.6, 2e-3) << "still held";
@@ -173,7 +173,7 @@ TEST_F(Attached, OtherBodiesLoseNoStepAndNoPatchByIt) {
   ASSERT_EQ(before.patches.size(), 1u) << describe(said());
   std::uint64_t sequence = before.sequence;
   const auto expectGoesOn = [&](const std::string& call, const std::function<void()>& change) {
-    pipeline().callsComeAt(static_cast<StampNs>((stamp_s + 0.05) * 1e9));
+    pipeline().callsComeAt({static_cast<StampNs>((stamp_s + 0.05) * 1e9)});
     change();
     for (const bool is_seam : {true, false}) {
       feedNext(-0.01f);
