@@ -41,6 +41,8 @@ using TopologyFilter =
 
 class MonitorPipeline {
  public:
+  static constexpr const char* OTHERS_EXPECTED = "other contacts are expected now";
+
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file, or the
   /// effect that is asked for and that the scene cannot have. `map_source`: as EffectTracker's.
   MonitorPipeline(MonitorConfig config, TransformFeed& transforms, const std::string& map_source = {});
@@ -88,9 +90,10 @@ class MonitorPipeline {
   Outcome checkNow(std::int64_t now_ns);
 
   /// Changes what can be changed while it runs. `change` is called twice, with a copy and, once all of it holds, with
-  /// the options themselves, of which it writes nothing but what it changes. Throws std::invalid_argument naming the
-  /// option; all then stays.
-  void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
+  /// the options themselves, of which it writes nothing but what it changes; then it may not fail. `why`: what is void
+  /// where other contacts are expected now. Throws std::invalid_argument naming the option; all then stays.
+  void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change,
+                   const std::string& why = OTHERS_EXPECTED);
 
   /// The phase of the task that is on from the next step on. Throws ParameterError naming those that there are; all
   /// then stays.
@@ -208,7 +211,7 @@ class MonitorPipeline {
     bool kept = false;     // that, or one before it was: a static body sends its only frame once, and steps do not wait
     bool told = false;     // the problem about it has been set
     StampNs receipt_ns = 0;
-    std::string reason;    // why it has no place yet
+    std::string reason;  // why it has no place yet
   };
   struct Attached {
     AttachedObject object;
@@ -233,9 +236,9 @@ class MonitorPipeline {
   bool intends_anew_ = false;        // since then
   std::string voided_;
   static constexpr StampNs NOT_YET = std::numeric_limits<StampNs>::max();
-  CallTime call_, changed_at_;   // the latter of the last call that changed something
-  std::string changed_;          // what it did
-  StampNs since_ns_ = NOT_YET;   // the first stamp of after that
+  CallTime call_, changed_at_;  // the latter of the last call that changed something
+  std::string changed_;         // what it did
+  StampNs since_ns_ = NOT_YET;  // the first stamp of after that
   Statement statement_;
   std::vector<StampNs> widened_ns_;                 // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;                        // a static body of which the monitor has a frame
@@ -294,7 +297,7 @@ class MonitorPipeline {
   /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.
   void doubtMap(const Outcome& outcome);
   void keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new);
-  void voidWhatWasSaid(const std::string& why);
+  void voidWhatWasSaid(const std::string& why) noexcept;
   void setRigid(std::size_t body, const MeshResource& mesh);
   static Rigid rigidOf(const MeshResource& mesh);
   /// The parameter that one of the expectations is from.
@@ -356,13 +359,21 @@ class MonitorPipeline {
   bool placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, bool is_of_after, MeshFrame& frame,
                 std::string& reason) const;
   /// Time begins anew at this stamp, and tf forgets where things were let go.
-  void settleLetGo(StampNs stamp_ns);
+  void beginAnew(StampNs stamp_ns);
   Carrier carrierOf(const std::string& frame, std::uint64_t epoch) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
-  /// A body is another one from the next step on.
-  void setBody(std::size_t body, const Body& what, Rigid rigid);
+  /// What is expected, of what hands hold, and of what is attached; and what of that is not looked at.
+  struct Expected {
+    std::vector<Expectation> expected, held;
+    std::vector<std::string> excluded;
+    void swapInto(MonitorOptions& options) noexcept;
+  };
+  Expected expectedOf(const std::string& phase, const std::vector<Body>& bodies) const;
+  void expectNow(const std::string& phase, const std::string& why = OTHERS_EXPECTED);
+  /// A body is another one from the next step on, by what is attached now. All or nothing.
+  void setBody(std::size_t body, const Body& what, Rigid rigid, const std::string& why);
+  void placeToCome(std::size_t body);
   std::size_t attachedNumber(const std::string& name) const;
-  void expectNow(const std::string& phase);
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
   /// What the monitor is to have of it: the map in its place, or why there is none. False: no place yet.

@@ -48,7 +48,7 @@ bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epo
   return true;
 }
 
-void MonitorPipeline::settleLetGo(StampNs stamp_ns) {
+void MonitorPipeline::beginAnew(StampNs stamp_ns) {
   for (std::optional<Rigid>& rigid : rigid_) {
     const bool is_held = !rigid || rigid->let_go_ns == Rigid::NEVER;
     if (is_held || secondsBetween(stamp_ns, rigid->let_go_ns) <= tolerance::LATE_FRAME_S) continue;
@@ -57,6 +57,7 @@ void MonitorPipeline::settleLetGo(StampNs stamp_ns) {
     if (placeOne(*rigid, rigid->let_go_ns, tracks_.epoch(), true, there, reason)) continue;
     rigid->doubt = "time went back before tf had come to where it was let go";
   }
+  transforms_.beginAnew(stamp_ns);
 }
 
 /// lost: why it has no place; empty: it has.
@@ -101,18 +102,15 @@ bool MonitorPipeline::placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool
   return true;
 }
 
-void MonitorPipeline::setBody(std::size_t body, const Body& what, Rigid rigid) {
-  monitor_->setBody(body, what);
-  effects_.setBody(body, what);
-  rigid_.resize(std::max(rigid_.size(), body + 1));
-  rigid_[body] = std::move(rigid);
-  // So that the next one is answered with it.
+/// So that the next step is answered with it; should memory end, that one has no place of it, and is not answered.
+void MonitorPipeline::placeToCome(std::size_t body) try {
   for (const StampNs stamp_ns : monitor_->stampsToCome()) {
     MeshFrame frame;
     std::string reason;
     const bool placed = placeOne(*rigid_[body], stamp_ns, tracks_.epoch(), false, frame, reason);
     pushRigid(body, std::move(frame), placed ? "" : reason, 0);
   }
+} catch (const std::bad_alloc&) {
 }
 
 void MonitorPipeline::keep(std::size_t body) {

@@ -153,16 +153,13 @@ void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
 void CollisionMonitor::Impl::listenToChanges(const ros::NodeHandle& service) {
   Reconfigure::Events events;
   events.change = [this](const Reconfigure::Change& change) -> std::string {
-    // Nobody knows what a worker will say that is busy for too long: then it is not to do it any more.
-    const auto is_wanted = std::make_shared<std::atomic<bool>>(true);
-    const auto run = [this, change, is_wanted] {
-      if (!*is_wanted) return Reply{};
+    const auto run = [this, change] {
       pipeline.reconfigure(change);
       state.setLimits(livenessLimits(config));
       return Reply{true, ""};
     };
-    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-    *is_wanted = false;
+    // Nobody knows what a worker will say that is busy for too long: then it is not to do it any more.
+    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S, false);
     return reply.success ? "" : reply.message;
   };
   events.refused = [this](const std::string& why) {
