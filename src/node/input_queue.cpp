@@ -1,5 +1,6 @@
 #include "node/input_queue.h"
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -83,11 +84,13 @@ void InputQueue::command(std::function<void()> run) {
   changed_.notify_one();
 }
 
-Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s) {
+Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s, bool may_be_late) {
+  const auto is_settled = std::make_shared<std::atomic<bool>>(false);  // whether it is carried out
   auto promise = std::make_shared<std::promise<Reply>>();
   std::future<Reply> future = promise->get_future();
   // The command alone holds the promise: dropped, it breaks it, and the wait ends.
-  command([promise = std::move(promise), run] {
+  command([promise = std::move(promise), run, is_settled] {
+    if (is_settled->exchange(true)) return;
     try {
       promise->set_value(run());
     } catch (const std::exception& error) {
@@ -95,7 +98,9 @@ Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s) {
     }
   });
   if (future.wait_for(std::chrono::duration<double>(timeout_s)) != std::future_status::ready) {
-    return {false, "the worker is busy with a step; this will be done after it"};
+    if (may_be_late) return {false, "the worker is busy with a step; this will be done after it"};
+    if (!is_settled->exchange(true)) return {false, "the worker is busy with a step; this will not be done"};
+    // It has just been begun, and its own answer is the true one.
   }
   try {
     return future.get();

@@ -96,6 +96,8 @@ struct Monitor::Impl {
   }
 
   Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
+  void check(const MonitorOptions& next, const std::vector<Body>& with) const;
+  void take(MonitorOptions next) noexcept;
   bool isStream(std::size_t body) const { return bodies.at(body).motion == BodyMotionKind::STREAM; }
   /// All or nothing. Counts the frame, or has it told as a step.
   StepStatus push(std::size_t body, MeshFrame frame, std::int64_t now_ns);
@@ -156,7 +158,9 @@ struct Monitor::Impl {
   void followOwnVoxels(StampNs stamp_ns);
   void tellBetweenSteps();
   void limitMapsToCome();
-  void forgetOwnVoxels(std::size_t body);
+  /// All or nothing. Whether the map in force is to be reduced anew.
+  bool forgetOwnVoxels(std::size_t body);
+  void reduceAnew() noexcept;
   /// Whether it can be used together with the one that is trusted; else there is none.
   bool fitsTrusted(const ObstacleMap& next);
   void settleDoubt(Step& step, const Deadline& deadline);
