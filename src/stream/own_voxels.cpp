@@ -224,6 +224,7 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
     stated_[key] = voxel;
   }
   seen_alone_ = std::move(look.seen_alone);
+  hidden_free_ = std::move(look.hidden_free);
   listEntered(look, bodies, std::move(outside));
 }
 
@@ -371,7 +372,6 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   askUnseen(look, there, ways_there);
   for (const ReachedCube& cube : look.cubes) follow(cube, look);
   remembered_ = std::move(look.hidden);
-  hidden_free_ = std::move(look.hidden_free);
   stateWhatAppeared(look, bodies, ways);
   unseen_.keep();
   if (before_ && look.is_gap) gap_ = gapBefore(map);
