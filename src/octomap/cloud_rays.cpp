@@ -209,6 +209,7 @@ void CloudRays::read(const SensorView& view, const ViewLimits& limits, std::size
 
 Seen CloudRays::look(const OctreeCube& cube) {
   Seen seen = followed_.look(cube);
+  if (seen == Seen::ALL) return seen;
   asked_ = 0;
   const auto ask = [&](std::size_t i) {
     if (seen == Seen::ALL || !faces_[i].is_seen) return;

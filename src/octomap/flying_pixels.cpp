@@ -29,7 +29,7 @@ void leaveOutFlying(std::vector<float>& values, std::size_t width, std::size_t d
     const float* const at = &depths[i];
     const auto flies = [&](std::ptrdiff_t pair) {
       const float low = std::min(at[-pair], at[pair]), high = std::max(at[-pair], at[pair]);
-      return low < *at && *at < high && !std::isnan(at[-pair]) && !std::isnan(at[pair]);
+      return low < *at && *at < high;  // not where one of them is no number
     };
     const auto isNear = [&](std::ptrdiff_t pair) {
       return std::abs(at[-pair] - *at) <= apart || std::abs(at[pair] - *at) <= apart;
