@@ -48,8 +48,9 @@ struct BodyConfig {
 /// told by the topic and the frame_id of its messages.
 struct CloudSource {
   std::string topic;
-  std::string camera_info;   ///< topic of a depth picture's CameraInfo; empty: camera_info beside the picture's
-  std::string sensor_frame;  ///< where the sensor is whose clouds come in the map's own frame; empty: nobody says
+  std::string camera_info;         ///< topic of a depth picture's CameraInfo; empty: camera_info beside the picture's
+  std::string sensor_frame;        ///< where the sensor is whose clouds come in the map's own frame; empty: nobody says
+  bool leaves_out_flying = false;  ///< octomap/flying_pixels.h
 };
 
 /// The parameters under `intent`: of ~intended.

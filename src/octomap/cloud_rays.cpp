@@ -19,7 +19,7 @@ constexpr double MOST_TANGENT = 2;     // of a face that is the only one
 constexpr double MOST_PIXELS = 32000;  // along a side
 constexpr std::size_t CELL_BYTES = 24, SAMPLES = 512;
 constexpr int RECENT_BITS = 15;
-constexpr double SQRT3 = 1.7320508075688772;
+constexpr double SQRT6 = 2.449489742783178;
 
 bool isMeasured(const float* p, double near2) {
   const double x = p[0], y = p[1], z = p[2], square = x * x + y * y + z * z;
@@ -209,26 +209,37 @@ void CloudRays::read(const SensorView& view, const ViewLimits& limits, std::size
 
 Seen CloudRays::look(const OctreeCube& cube) {
   Seen seen = followed_.look(cube);
-  const double half = 0.5 * cube.size(), around = 2 * SQRT3 * half;
-  const Vector3d at = sensor_from_map_ * (Vector3d(cube.x + half, cube.y + half, cube.z + half) - sensor_);
-  for (std::size_t i = 0; i < face_count_; ++i) {
-    Face& face = faces_[i];
-    face.is_asked = false;
-    if (!face.is_seen || seen == Seen::ALL) continue;
-    const Eigen::Index ahead = static_cast<Eigen::Index>(i / 2);
-    const double depth = i % 2 == 0 ? at[ahead] : -at[ahead];
-    if (face_count_ > 1 && std::max(std::abs(at[(ahead + 1) % 3]), std::abs(at[(ahead + 2) % 3])) > depth + around)
-      continue;  // it lies beside of what the face sees
-    const Seen there = face.picture.look(cube);
-    face.is_asked = there == Seen::SOME;
+  if (seen == Seen::ALL) return seen;
+  asked_ = 0;
+  const auto ask = [&](std::size_t i) {
+    if (seen == Seen::ALL || !faces_[i].is_seen) return;
+    const Seen there = faces_[i].picture.look(cube);
+    if (there == Seen::SOME) asked_ |= 1u << i;
     seen = std::max(seen, there);
+  };
+  if (face_count_ == 1) {
+    ask(0);
+    return seen;
+  }
+  // A ball around the cube meets what a face sees if its middle lies no further beside of that than this.
+  const double half = 0.5 * cube.size(), around = SQRT6 * half;
+  const Vector3d at = sensor_from_map_ * (Vector3d(cube.x + half, cube.y + half, cube.z + half) - sensor_);
+  const Vector3d away = at.cwiseAbs();
+  const double most = away.maxCoeff();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (away[axis] + around < most) continue;
+    const std::size_t ahead = 2 * axis + (at[axis] < 0 ? 1 : 0);
+    ask(ahead);
+    if (most + away[axis] <= 2 * around) ask(ahead ^ 1u);
   }
   return seen;
 }
 
 bool CloudRays::crosses(const OctreeCube& cube) const {
-  return std::any_of(faces_.begin(), faces_.end(),
-                     [&](const Face& face) { return face.is_asked && face.picture.crosses(cube); });
+  for (std::size_t i = 0; i < face_count_; ++i) {
+    if ((asked_ >> i & 1u) != 0 && faces_[i].picture.crosses(cube)) return true;
+  }
+  return false;
 }
 
 }  // namespace dccd

@@ -33,7 +33,6 @@ class CloudRays {
     Eigen::Matrix3d from_sensor;
     Eigen::Array2d lo, hi;  // of x and y
     bool is_seen = false;   // a point lies there
-    bool is_asked = false;  // crosses() has to ask
     std::int32_t width = 0, height = 0;
     float* depths = nullptr;
     std::vector<std::uint32_t> points;  // of its pixels, where depths say that there is one
@@ -42,6 +41,7 @@ class CloudRays {
   };
   std::array<Face, 6> faces_;
   std::size_t face_count_ = 0;
+  unsigned asked_ = 0;  // of faces, as bits: crosses() has to ask
   double farthest_m_ = 0;
   Eigen::Vector3d sensor_;  // in voxels
   Eigen::Matrix3d sensor_from_map_;

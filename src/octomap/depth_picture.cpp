@@ -108,7 +108,8 @@ void DepthPicture::reduce(const Level& from, Level& to, bool is_first) const {
 
 /// Of the pixels of the area, and of some beside them.
 DepthPicture::Depths DepthPicture::depthsOf(const Area& area) const {
-  int level = 0;
+  // Below this one a side has more than three squares.
+  int level = 30 - __builtin_clz(static_cast<unsigned>(std::max(area.u1 - area.u0, area.v1 - area.v0)) | 3u);
   while (((area.u1 >> level) - (area.u0 >> level)) > 2 || ((area.v1 >> level) - (area.v0 >> level)) > 2) ++level;
   const Level& squares = levels_[level];
   // Always three by three, some more than once: processors guess badly how many there are of each cube.
