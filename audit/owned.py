@@ -163,7 +163,7 @@ class Owned:
         return found
 
     def follow(self):
-        w, before, own, doubt, remembered, hidden = self.world, None, NONE, NONE, NONE, NONE
+        w, before, own, doubt, remembered = self.world, None, NONE, NONE, NONE
         ends = np.concatenate([points for some in self.every.values() for places in some for _, points, _ in places])
         box = np.stack(np.meshgrid(*zip(np.nanmin(ends, 0), np.nanmax(ends, 0))), -1).reshape(-1, 3)
         for m in w.maps:
@@ -172,7 +172,7 @@ class Owned:
             if before is not None and m.stamp < before.stamp:
                 raise NotCovered('maps whose stamps go back, and own voxels')
             if before is not None and (m.frame, m.resolution) != (before.frame, before.resolution):
-                before, own, doubt, remembered, hidden = None, NONE, NONE, NONE, NONE
+                before, own, doubt, remembered = None, NONE, NONE, NONE
             back = self.back(m, w.placed_at)
             reach = {name: m.resolution if r == 'auto' else r for name, r in self.reach.items()}
             more, corners = max(reach.values()) + 2 * m.resolution, placed.carried(back, box)
@@ -186,12 +186,6 @@ class Owned:
                 fresh = fresh[~shown(before.corners, before.sizes, fresh)]
             fresh, gone = fresh[~np.isin(fresh, remembered)], gone[~shown(m.corners, m.sizes, gone)]
             lasts = ~shown(*m.free, gone) if len(m.free[1]) else np.zeros(len(gone), bool)
-            if before is not None and w.params.get('unknown_space') == 'occupied':
-                # What was free, or its own, may be so for as long as it is within reach.
-                hidden = np.unique(np.concatenate([hidden, own, voxels(*before.free, low, high)]))
-                hidden = hidden[~shown(m.corners, m.sizes, hidden) & ~shown(*m.free, hidden)]
-                hidden = hidden[np.any([self.reached(name, hidden, self.ways(name, since, m.stamp), back, reach[name], m.resolution)
-                                        for name in self.every], axis=0)]
             own, doubt = own[shown(m.corners, m.sizes, own)], doubt[shown(m.corners, m.sizes, doubt)]
             for name in self.every:
                 ways = self.ways(name, since, m.stamp)
@@ -206,7 +200,7 @@ class Owned:
                     lasts |= self.reached(name, gone, ways, back, reach[name], m.resolution, sure=True)
             # What was left, what appeared at a seam, after a gap or from outside of reach: of what may be own all may be in doubt.
             doubt = np.unique(np.concatenate([doubt, own, fresh]))
-            self.of[m.number] = np.union1d(own, hidden), doubt
+            self.of[m.number] = own, doubt
             remembered, before = gone[lasts], m
 
     def follow_clouds(self):

@@ -48,9 +48,6 @@ struct ObstacleMap {
   /// one after the last.
   std::uint64_t number = 0;
   OwnVoxels own{};  ///< what was taken out of it
-  /// Of a map that is given: voxels that it does not know, and that are obstacles but where a body has hidden them
-  /// since they were free; `surface` does not hold them yet. Null: it has all obstacles.
-  std::shared_ptr<const KnownSpace> unknown{};
   /// Where its frame goes from there, as that of a body that turns: fixed_from_map, ascending, the last one where the
   /// step ends (u = 1). Empty: it stays.
   std::vector<Waypoint> way{};

@@ -38,7 +38,6 @@ struct DecodedOctomap {
   std::vector<float> log_odds;  ///< of what is occupied; empty: a binary stream, or they were not wanted
   /// Of what is occupied: where the sensor found something since the map before; nothing: nobody tells.
   std::optional<std::vector<OccupiedLeaf>> found;
-  std::optional<std::vector<OccupiedLeaf>> looked_at;  ///< of what it knows; nothing: all of it
 };
 
 /// What a stream holds: leaves, and the nodes of the trees that are built of the occupied ones and of all.

@@ -26,6 +26,8 @@ Enum choiceOf(ParameterReader& reader, const std::string& name, Enum fallback,
 void refuseGone(ParameterReader& reader, const std::string& section);
 /// The map's parameters.
 void readMap(ParameterReader& reader, MonitorConfig& config);
+/// Refuses own voxels beside an unknown space that is occupied. After the effects.
+void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config);
 /// own_voxels_m of the section [m], or the fallback; `auto`: ONE_VOXEL.
 double ownVoxelsOf(ParameterReader& reader, double fallback);
 /// minimum_separation_m of the section [m], or the fallback.

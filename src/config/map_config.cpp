@@ -116,6 +116,13 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   }
 }
 
+void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) {
+  if (!config.ownsVoxels() || config.unknown_space != UnknownSpace::OCCUPIED) return;
+  reader.fail("own_voxels_m",
+              "is above 0, but with unknown_space: occupied a body's own voxels cannot be told from what "
+              "is unknown; write unknown_space: free, or own_voxels_m: 0");
+}
+
 std::vector<std::string> MonitorConfig::liveMapNames() const {
   if (!cloud_named) return {octomap_topic};
   std::vector<std::string> names;

@@ -360,6 +360,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, con
   reader.finish();
   config.checkMapNames();
   applyEffects(config);
+  checkOwnVoxels(reader, config);
   settleAccuracy(reader, config);
   findCarriers(reader, config);
   checkSpeeds(reader, config);

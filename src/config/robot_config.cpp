@@ -103,7 +103,9 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
     body.body.self_collision = false;
     body.body.against_obstacle = asked.against_map;
     body.body.minimum_separation_m = std::max(asked.paddingOf(part.link), config.minimum_separation_m);
-    const bool owns = settingOf(config.effects, Effect::OWN_VOXELS) != EffectSetting::OFF;
+    // Where the unknown is occupied, own voxels cannot be told from it, and nobody asked for them by name.
+    const bool owns = settingOf(config.effects, Effect::OWN_VOXELS) != EffectSetting::OFF &&
+                      config.unknown_space != UnknownSpace::OCCUPIED;
     body.body.own_voxels_m = owns ? asked.own_voxels_m : 0;
     for (std::size_t other = 0; other < robot.parts.size(); ++other) {
       if (other == p || mayMeet(part, robot.parts[other], asked.against_links, never)) continue;

@@ -261,10 +261,6 @@ void CloudMapping::insert(const SensorView& seen, Reading& reading) {
     throw OctomapError(problem + "; a quarter of max_map_mb " + std::to_string(config_.max_map_bytes >> 20) +
                        " is for it: raise that or obstacle_resolution_m, or set obstacle_max_range_m or obstacle_box");
   }
-  if (config_.unknown_space == UnknownSpace::OCCUPIED && config_.ownsVoxels()) {
-    if (!recent_looks_) recent_looks_.emplace(config_.cloud_map);
-    recent_looks_->add(seen, reading.map.stamp_ns, cloudMemory(config_) / 2);
-  }
   no_measurement_ += counts.near;
   const std::size_t all = seen.width * seen.height, said = all - counts.near - counts.nothing;
   if (said == 0) {
@@ -360,9 +356,7 @@ LoadedMap CloudMapping::add(const CloudMessage& message, const std::function<boo
       for (const auto& [name, view] : views_) now.insert(now.end(), view.doubtful.begin(), view.doubtful.end());
       map.own.seen = share(std::move(now));
     }
-    DecodedOctomap leaves = map_->leaves(limits);
-    if (recent_looks_) leaves.looked_at = recent_looks_->leaves();
-    return leaves;
+    return map_->leaves(limits);
   });
   if (!is_seen) {
     miss(message.source, map.problem);

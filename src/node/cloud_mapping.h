@@ -18,7 +18,6 @@
 #include "node/camera_infos.h"
 #include "node/map_memory.h"
 #include "node/monitor_pipeline.h"
-#include "node/recent_looks.h"
 
 namespace dccd {
 
@@ -85,7 +84,6 @@ class CloudMapping {
   const MapMemory& memory_;
   std::string frame_;
   std::optional<CloudMap> map_;
-  std::optional<RecentLooks> recent_looks_;  // where what nobody looks at is not free
   std::map<ViewName, View> views_;
   StampNs first_ns_ = 0;                            // LoadedMap::first_ns
   std::uint64_t looks_ = 0;                         // clouds that are in the map, be it in part

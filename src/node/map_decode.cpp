@@ -33,19 +33,6 @@ OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std
   return limits;
 }
 
-/// What is unknown to a map becomes part of it: now, or once it is told what bodies hide.
-template <class Counted>
-void addUnknown(const MonitorConfig& config, std::size_t most, const Counted& counted, DecodedOctomap& decoded,
-                LoadedMap& map) {
-  if (config.unknown_space != UnknownSpace::OCCUPIED) return;
-  const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, most);
-  if (config.ownsVoxels() && !map.trusted) {
-    map.unknown = counted(KnownSpace::build(decoded.resolution_m, unknown));
-  } else {
-    decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
-  }
-}
-
 /// Each list ends before the next is made: what they take together is what MapMemory reckons with.
 void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before,
            std::size_t max_unknown, LoadedMap& map) {
@@ -59,14 +46,12 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
     known.assign(decoded.occupied.begin(), decoded.occupied.end());
     known.insert(known.end(), decoded.free.begin(), decoded.free.end());
     std::vector<OccupiedLeaf>().swap(decoded.free);
-    const auto spaceOf = [&](const std::vector<OccupiedLeaf>& leaves) {
-      return decoded.found ? KnownSpace::build(decoded.resolution_m, leaves, *decoded.found)
-                           : KnownSpace::build(decoded.resolution_m, leaves);
-    };
-    map.known = counted(spaceOf(known));
-    std::vector<OccupiedLeaf>().swap(known);
-    addUnknown(config, max_unknown, counted, decoded, map);
-    if (decoded.looked_at) map.known = counted(spaceOf(*decoded.looked_at));
+    map.known = counted(decoded.found ? KnownSpace::build(decoded.resolution_m, known, *std::move(decoded.found))
+                                      : KnownSpace::build(decoded.resolution_m, known));
+  }
+  if (config.unknown_space == UnknownSpace::OCCUPIED) {
+    const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, max_unknown);
+    decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
   }
   std::vector<OccupiedLeaf>& occupied = decoded.occupied;
   map.surface = counted(before ? nextSurface(decoded.resolution_m, std::move(occupied), *before)
@@ -98,7 +83,7 @@ void loadMap(const MonitorConfig& config, const MapMemory* memory, const VoxelSu
   }
   if (map.problem.empty()) return;
   map.surface = nullptr;
-  map.known = map.unknown = nullptr;
+  map.known = nullptr;
 }
 
 std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,

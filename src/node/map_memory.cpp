@@ -48,7 +48,7 @@ std::size_t MapMemory::accept(const OctomapCounts& counts) const {
   }
   if (clouds) least += built(counts.occupied, counts.occupied_nodes) + need.kept;  // with what was seen too seldom
   const std::size_t wanted = std::max(least, need.most + held);
-  if (wanted <= room) return (room - wanted) / MAP_LEAF_ADDED / (config_.ownsVoxels() ? 2 : 1);  // in its own tree, too
+  if (wanted <= room) return (room - wanted) / MAP_LEAF_ADDED;
   throw OctomapError("octomap data hold " + std::to_string(counts.occupied) + " occupied and " +
                      std::to_string(counts.free) + " free leaves, which need " + inMegabytes(wanted) +
                      " where there is room for " + inMegabytes(room) + (clouds ? ", three" : ", five") +

@@ -165,7 +165,6 @@ void MonitorPipeline::limitUnplacedMaps() {
     for (const UnplacedMap& one : unplaced_maps_) {
       if (one.map.surface) bytes += one.map.surface->memoryBytes();
       if (one.map.known) bytes += one.map.known->memoryBytes();
-      if (one.map.unknown) bytes += one.map.unknown->memoryBytes();
     }
     return unplaced_maps_.size() > MOST_UNPLACED || bytes > config_.max_map_bytes / SHARE_OF_UNPLACED;
   };

@@ -331,7 +331,7 @@ void MonitorPipeline::doubtMap(const Outcome& outcome) {
   for (std::size_t b = 0; b < map_doubts_.size(); ++b) {
     const Body& body = outcome.step->bodies[b];
     if (map_doubts_[b] || !meetsMap(body)) continue;
-    // Own voxels are looked for already; a file's, or what is unknown, are nobody's.
+    // Own voxels are looked for already, or cannot be; a file's are nobody's.
     if (ownsVoxels(body) || config_.takesMapFileAlone() || config_.unknown_space == UnknownSpace::OCCUPIED) continue;
     std::set<Index> occupied;
     const auto isMet = [b](const std::array<std::uint16_t, 2>& pair, bool expected) {

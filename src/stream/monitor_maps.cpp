@@ -58,8 +58,7 @@ void Monitor::setMap(ObstacleMap map) {
   const bool is_one = map.surface || !map.problem.empty();  // else there is none, and none came
   if (map.number == 0 && is_one) map.number = m.map_number + 1;
   m.map_number = std::max(m.map_number, map.number);
-  const bool as_it_is =
-      map.trusted || (m.tracked().empty() && !m.trusted.surface && !map.own.doubted_surface && !map.unknown);
+  const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface && !map.own.doubted_surface);
   if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
     m.awaitTelling();
     m.telling = {};

@@ -34,7 +34,6 @@ void OwnVoxelFinder::forget() {
   remembered_.clear();
   seen_.clear();
   seen_alone_.clear();
-  hidden_free_.clear();
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
@@ -44,11 +43,6 @@ bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
   last_frames_.erase(body);
   known_.erase(body);
   bool any = false;
-  for (auto one = hidden_free_.begin(); one != hidden_free_.end();) {
-    const bool was_its = one->second == body;
-    any = any || was_its;
-    one = was_its ? hidden_free_.erase(one) : std::next(one);
-  }
   for (auto one = stated_.begin(); one != stated_.end();) {
     Stated& voxel = one->second;
     const bool was_its = voxel.owners.has(body);
@@ -159,8 +153,6 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
     case ReachedCube::Why::SEEN:
       if (cube.near.empty() || wasSeenAgain(cube.leaf)) seeAlone(cube.leaf, look);
       return;
-    case ReachedCube::Why::HIDDEN:
-      return hide(cube, look);
     case ReachedCube::Why::STATED:
       break;
   }
@@ -172,8 +164,7 @@ void OwnVoxelFinder::follow(const ReachedCube& cube, Look& look) {
   const bool may_hide = !look.change.known && voxel.state == VoxelState::DOUBT && if_free != VoxelEvent::FREE_ALONE;
   const bool is_free = !voxel.shown && look.change.isFree(cube.leaf) && !may_hide;
   const bool was_left = voxel.state == VoxelState::LEFT || voxel.state == VoxelState::LEFT_SEEN;
-  const bool is_lost = look.map.unknown && !voxel.shown && owners.empty();  // nobody looks there, and nobody hides it
-  const bool is_over = is_lost || (was_left && look.map.stamp_ns - voxel.left_ns > nanoseconds(tolerance::OWN_LEFT_S));
+  const bool is_over = was_left && look.map.stamp_ns - voxel.left_ns > nanoseconds(tolerance::OWN_LEFT_S);
   const VoxelEvent if_occupied = is_over ? VoxelEvent::OCCUPIED_WITH_OTHER : look.occupied(cube, owners);
   voxel.state = nextState(voxel.state, is_free ? if_free : if_occupied);
   if (!was_left) voxel.left_ns = look.map.stamp_ns;
@@ -225,7 +216,6 @@ void OwnVoxelFinder::stateWhatAppeared(Look& look, const std::vector<TrackedBody
     stated_[key] = voxel;
   }
   seen_alone_ = std::move(look.seen_alone);
-  hidden_free_ = std::move(look.hidden_free);
   listEntered(look, bodies, std::move(outside));
 }
 
@@ -284,10 +274,8 @@ void OwnVoxelFinder::listEntered(const Look& look, const std::vector<TrackedBody
 }
 
 /// Which of what the map before left out is UNKNOWN: a body was within reach of it at that look, and already at the
-/// last one that is a gap ago. What nobody looks at for no longer than that is free. Where the unknown is an obstacle
-/// it is UNKNOWN unless a body hides it since it was FREE.
+/// last one that is a gap ago. What nobody looks at for no longer than that is free.
 std::vector<OccupiedLeaf> OwnVoxelFinder::unknownOf(std::vector<OccupiedLeaf> left_out, const Look& look) const {
-  if (look.map.unknown) return withoutHidden(left_out);
   if (past_.empty()) return left_out;
   for (const PastLook* past : {&past_.back(), &past_.front()}) {
     if (past->may_be_near) continue;
@@ -342,7 +330,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
   }
   endWhereItMoved(map, bodies);
-  std::size_t hidden = remembered_.size() + unseen_.size() + hidden_free_.size();
+  std::size_t hidden = remembered_.size() + unseen_.size();
   for (const auto& one : stated_) hidden += one.second.shown ? 0 : 1;
   if (hidden > MOST_REMEMBERED) forget();
   const double since_s = before_ ? secondsBetween(before_ns_, map.stamp_ns) : 0;
@@ -368,7 +356,6 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   }
   listChanges(look);
   listSeen(look);
-  listHidden(look);
   searchReach(bodies, ways, map.map_from_fixed, resolution_m, look.cubes, &shapes_, look.is_gap);
   askUnseen(look, there, ways_there);
   for (const ReachedCube& cube : look.cubes) follow(cube, look);

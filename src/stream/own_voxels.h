@@ -7,8 +7,6 @@
 // - Where a body is gone, nothing is its own any more.
 // - A voxel in which the map's maker has seen something, but not often enough for an obstacle, is in doubt, unless a
 //   body's surface was within own_voxels_m of it at that time. Seen so in two maps it was not free.
-// - Where the unknown is an obstacle (ObstacleMap::unknown), what a map leaves out is FREE only while a body that may
-//   account for it has hidden it since the last map that showed it so. It is excluded like an own voxel.
 // What has no state here follows from the map before: what was occupied is an obstacle, what it showed as free is free,
 // and of what it left out nothing is known.
 #pragma once
@@ -73,8 +71,6 @@ class OwnVoxelFinder {
   /// What a map's maker saw, not often enough for an obstacle, with nobody within reach: packed, and whether in more
   /// than one map. One is a sensor's noise where a body comes next; what was seen again is there, whoever comes.
   using SeenAlone = std::unordered_map<std::uint64_t, bool>;
-  /// FREE, though left out, and which body hides it: packed.
-  using HiddenFree = std::unordered_map<std::uint64_t, std::uint16_t>;
   /// Of one map.
   struct Look;
   /// Bodies that were there, their ways up to it, and whether some other place of theirs was not known.
@@ -90,16 +86,10 @@ class OwnVoxelFinder {
   void findSeams(Look& look, const std::vector<TrackedBody>& bodies, double lag_s);
   void listChanges(Look& look);
   void listSeen(Look& look);
-  void listHidden(Look& look);
   void seeAlone(const OccupiedLeaf& voxel, Look& look);
   bool wasSeenAgain(const OccupiedLeaf& voxel) const;
   void appear(const ReachedCube& cube, Look& look);
   void follow(const ReachedCube& cube, Look& look);
-  void hide(const ReachedCube& cube, Look& look) const;
-  /// What of the map's unknown voxels bodies hide, into `voxels`; the rest are obstacles.
-  std::vector<OccupiedLeaf> unknownObstacles(const ObstacleMap& map, const VoxelTree& sure,
-                                             std::vector<OwnVoxel>& voxels) const;
-  std::vector<OccupiedLeaf> withoutHidden(const std::vector<OccupiedLeaf>& cubes) const;
   std::vector<OccupiedLeaf> unknownOf(std::vector<OccupiedLeaf> left_out, const Look& look) const;
   void listLeftOut(Look& look) const;
   void askUnseen(Look& look, const std::vector<TrackedBody>& there, const std::vector<BodyWay>& ways_there);
@@ -131,7 +121,6 @@ class OwnVoxelFinder {
   RigidShapes shapes_;                         // of bodies that have been asked about
   std::vector<OccupiedLeaf> seen_;             // of the last map: in doubt for its maker
   SeenAlone seen_alone_;                       // of the last map
-  HiddenFree hidden_free_;                     // of the last map
   std::weak_ptr<const VoxelSurface> reduced_;  // of the map before, if it is still there
   std::uint64_t number_ = 0;                   // ObstacleMap::number of the last map
   std::string why_lost_;                       // why one was lost since it, as far as somebody said so

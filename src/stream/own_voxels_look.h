@@ -30,7 +30,6 @@ struct OwnVoxelFinder::Look {
   std::unordered_set<std::uint64_t> unknown{};  // packed, of what appeared, and the map before left out
   std::vector<OccupiedLeaf> hidden{};           // obstacles, remembered from now on
   SeenAlone seen_alone{};                       // from now on
-  HiddenFree hidden_free{};                     // from now on
 
   /// Who may go on to account for what these do.
   BodySet askedWith(const BodySet& owners) const {

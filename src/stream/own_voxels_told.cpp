@@ -92,8 +92,6 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
     visitUncovered(sure, {voxel.key, 1}, [&](const OccupiedLeaf& own) { without.push_back(own); });
   }
   for (const OccupiedLeaf& leaf : seen_) voxels.push_back({leaf.min, NOBODY, true});
-  std::vector<OccupiedLeaf> more = unknownObstacles(map, sure, voxels);
-  more.insert(more.end(), sure.leaves().begin(), sure.leaves().end());
   std::vector<OccupiedLeaf> doubted;
   for (const OwnVoxel& voxel : voxels) {
     if (voxel.doubted) doubted.push_back({voxel.key, 1});
@@ -104,11 +102,11 @@ ObstacleMap OwnVoxelFinder::withoutOwn(ObstacleMap map, const VoxelSurface* trus
   map.own.seen = seen.empty() ? nullptr : share(std::move(seen));
   map.own.voxels = share(std::move(voxels));
   describe(bodies, trust_first, map.known != nullptr, gap_, map.own);
-  if (!without.empty() || !more.empty()) {
+  if (!without.empty()) {
     const auto last = reduced_.lock();
     const std::shared_ptr<const VoxelSurface> given = map.surface;
     map.surface =
-        nextSurface(resolution_m, leavesWithout(VoxelSurface::Impl::of(*given).tree, VoxelTree(without), more),
+        nextSurface(resolution_m, leavesWithout(VoxelSurface::Impl::of(*given).tree, VoxelTree(without), sure.leaves()),
                     last ? *last : *given);
   }
   reduced_ = map.surface;

@@ -56,7 +56,7 @@ using BodyWay = std::vector<MeshStore::Stretch>;
 
 /// A cube, why it is asked for, and the bodies that reach it.
 struct ReachedCube {
-  enum class Why : std::uint8_t { APPEARED, VANISHED, REMEMBERED, STATED, SEEN, HIDDEN };
+  enum class Why : std::uint8_t { APPEARED, VANISHED, REMEMBERED, STATED, SEEN };
   OccupiedLeaf leaf;
   Why why;
   LeafBox box;

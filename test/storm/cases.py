@@ -419,16 +419,6 @@ def a_space_below_a_sheet_of_which_nothing_is_known(c):
     c.map([(9, 9, 9)], -.05, free=[(x, y, z) for x in range(-2, 4) for y in range(-2, 4) for z in range(2, 7)])
 
 
-def a_space_that_a_sheet_hides_and_one_that_nobody_hid(c):
-    """Each map has what one look saw: below the sheet nothing, within its reach and beyond."""
-    owned(c)
-    c.params.update(unknown_space='occupied', unknown_box=[-.1, -.1, -.1, .2, .2, .35])
-    free = {(x, y, z) for x in range(-2, 4) for y in range(-2, 4) for z in range(-2, 7)}
-    for k in range(10):
-        at = .1 * k - .05
-        c.map([(9, 9, 9)], at, free=free - {(x, y, z) for x in range(2) for y in range(2) for z in range(-2, int(down(at) // .05))})
-
-
 def an_obstacle_that_the_map_forgot_and_shows_again(c):
     """The map tells what it has seen free, and of the obstacle it tells nothing for a while."""
     owned(c, every(.1, 1.5))

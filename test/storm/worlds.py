@@ -332,7 +332,7 @@ class World:
             p['step_budget_ms'] = r.choice([.01, .05, 100])
         if r.random() < .1:
             p.update(r.choice([{'max_contacts': r.choice([1, 5])}, {'max_vertex_step_m': r.choice([.01, .05])}, {'effects': {'self_collision': 'off'}}]))
-        if maps and r.random() < .3:
+        if maps and 'own_voxels_m' not in p and r.random() < .3:
             p.update(unknown_space='occupied', unknown_box=[-.3, -.3, r.uniform(-.3, .1), .3, .3, .3])
         if clouds and r.random() < .3:
             p.update(r.choice([{'obstacle_min_range_m': .1}, {'obstacle_no_return': 'clears'}, {'obstacle_box': [-.1, -.1, -.1, .1, .1, .3]}]))

@@ -159,6 +159,9 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        "~minimum_separation_pairs asks for"},
       {"accuracy: exact, uncertainty: {radius_m: 0.01}",
        "~uncertainty asks for an uncertainty radius: write accuracy: conservative"},
+      {"own_voxels_m: auto, unknown_space: occupied, unknown_box: [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]",
+       "with unknown_space: occupied a body's own voxels cannot be told from what is unknown; write unknown_space: "
+       "free"},
       {"unknown_space: report", "unknown_space"},
       {"earliest_only: true", "~earliest_only is gone: a monitor looks for all contacts; remove it"},
       {"minimum_separation_pairs: [{between: [mush, octomap], separation_m: 0.01}]",

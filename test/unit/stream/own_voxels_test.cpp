@@ -589,29 +589,6 @@ TEST_F(OwnVoxelsOfTwo, WhatItMayHaveHiddenIsAnObstacleOnceItIsRemoved) {
   EXPECT_FALSE(assuranceOf(onto).clear());
 }
 
-TEST_F(OwnVoxelsOfTwo, WhatItHidWhereTheUnknownIsAnObstacleIsOneAtOnce) {
-  Cells beside;
-  for (int y = 3; y < 8; ++y) beside.insert({2, y, 5});
-  const auto give = [&](StampNs stamp_ns, const Cells& free, const Cells& unknown) {
-    ObstacleMap map = mapOf(VOXEL_M, leavesOf(slab(1) + voxelsOf(0.55)), stamp_ns);
-    map.known = KnownSpace::build(VOXEL_M, leavesOf(slab(1) + voxelsOf(0.55) + free));
-    map.unknown = KnownSpace::build(VOXEL_M, leavesOf(unknown));
-    monitor_->setMap(std::move(map));
-  };
-  give(250 * MS, beside, {});
-  feedBoth(300 * MS);
-  give(350 * MS, {}, beside);
-  const Outcome hides = feedBoth(400 * MS);
-  EXPECT_EQ(own(hides), 25u + 5u);
-  EXPECT_EQ(hides.step->map.surface->leafCount(), 100u);
-  removeCup();
-  const auto nothing = share(Topology::fromTriangles(0, {}));
-  for (const StampNs stamp_ns : {400 * MS, 500 * MS}) monitor_->push(1, {stamp_ns, nothing, {}}, NOW);
-  const Outcome onto = feed(500 * MS, 0.55);
-  EXPECT_EQ(own(onto), 0u);
-  EXPECT_EQ(onto.step->map.surface->leafCount(), 100u + 25u + 5u);
-}
-
 // The removal fails at one allocation after the other, and is tried again: there are the obstacles, or no map.
 TEST_F(OwnVoxelsOfTwo, ARemovalThatFailedLeavesNothingFree) {
   const int allocations = failingEverywhere([&](int n) {
@@ -822,16 +799,6 @@ TEST_F(OwnVoxels, WhileTheLagReachesBackBeyondAResetTheyStay) {
     EXPECT_EQ(own(outcome), 25u) << k;
     EXPECT_EQ(doubted(outcome), k >= 2 ? 1u : 0u) << k;
   }
-}
-
-TEST_F(OwnVoxels, WhereNobodyOwnsVoxelsAllThatIsUnknownIsAnObstacle) {
-  start(0);
-  ObstacleMap table = mapOf(VOXEL_M, leavesOf(slab(1)), 0);
-  table.unknown = KnownSpace::build(VOXEL_M, {voxelAt(4, 4, 4)});
-  monitor_->setMap(std::move(table));
-  feed(0, 0.55);
-  EXPECT_TRUE(assuranceOf(feed(100 * MS, 0.54)).clear());
-  EXPECT_EQ(assuranceOf(feed(200 * MS, 0.45)).touching, Touching::NEW);
 }
 
 TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {

@@ -57,7 +57,6 @@ class OneVoxel {
  public:
   /// OCCUPIED: by a map that does not tell what was found.
   enum Shows { OCCUPIED, FOUND, UNFOUND, FREE, LEFT_OUT };
-  explicit OneVoxel(bool unknown_counts = false) : unknown_counts_(unknown_counts) {}
   /// A map, and the bodies until then: at its stamp they are where they are told to be.
   void look(Shows shows, bool first, bool second, int pause_ms = 100) {
     const StampNs from = now_;
@@ -70,9 +69,6 @@ class OneVoxel {
     if (is_occupied) occupied.push_back(voxelAt(5, 5, 5));
     if (shows != LEFT_OUT) known.push_back(voxelAt(5, 5, 5));
     known.push_back(voxelAt(-90, 0, 0));  // there is something free
-    std::vector<OccupiedLeaf> unknown;
-    if (shows == LEFT_OUT) unknown.push_back(voxelAt(5, 5, 5));
-    if (unknown_counts_) map.unknown = KnownSpace::build(VOXEL_M, unknown);
     map.surface = VoxelSurface::build(VOXEL_M, occupied);
     std::vector<OccupiedLeaf> found;
     if (shows == FOUND) found.push_back(voxelAt(5, 5, 5));
@@ -103,7 +99,6 @@ class OneVoxel {
   OwnVoxelFinder finder_;
   Eigen::Isometry3d map_from_fixed_ = Eigen::Isometry3d::Identity();
   StampNs now_ = 1000 * MS;
-  const bool unknown_counts_;
   bool lost_ = false;
   bool was_near_[2] = {false, false};
   ObstacleMap reduced_;
@@ -163,23 +158,21 @@ void begin(OneVoxel& world, VoxelState state) {
 
 bool isLeft(VoxelState state) { return state == VoxelState::LEFT || state == VoxelState::LEFT_SEEN; }
 
-/// left_out: what the events call occupied is so by a map that leaves it out.
-void apply(OneVoxel& world, VoxelState state, VoxelEvent event, bool left_out = false) {
-  const OneVoxel::Shows occupied = left_out ? OneVoxel::LEFT_OUT : OneVoxel::OCCUPIED;
+void apply(OneVoxel& world, VoxelState state, VoxelEvent event) {
   const auto goAway = [&] {  // within this look the first body is near at its beginning
     if (state == VoxelState::UNKNOWN) world.look(OneVoxel::FREE, false, false);
     if (state == VoxelState::OWN || state == VoxelState::DOUBT) world.look(OneVoxel::OCCUPIED, false, false);
   };
   switch (event) {
     case VoxelEvent::OCCUPIED_WITH_OWNER:
-      return world.look(occupied, true, false);
+      return world.look(OneVoxel::OCCUPIED, true, false);
     case VoxelEvent::OCCUPIED_WITH_OTHER:
       goAway();
-      if (state == VoxelState::OWN || isLeft(state)) return world.look(occupied, false, true);
-      return world.look(occupied, true, false, 700);  // within reach in a part of a gap
+      if (state == VoxelState::OWN || isLeft(state)) return world.look(OneVoxel::OCCUPIED, false, true);
+      return world.look(OneVoxel::OCCUPIED, true, false, 700);  // within reach in a part of a gap
     case VoxelEvent::OCCUPIED_ALONE:
       goAway();
-      return world.look(occupied, false, false);
+      return world.look(OneVoxel::OCCUPIED, false, false);
     case VoxelEvent::FOUND_ALONE:
       goAway();
       return world.look(OneVoxel::FOUND, false, false);
@@ -189,7 +182,7 @@ void apply(OneVoxel& world, VoxelState state, VoxelEvent event, bool left_out = 
     case VoxelEvent::OCCUPIED_AT_SEAM:
       goAway();
       world.loseFirst();
-      return world.look(occupied, false, false, 700);
+      return world.look(OneVoxel::OCCUPIED, false, false, 700);
     case VoxelEvent::FREE_WITH_OWNER:
       return world.look(OneVoxel::FREE, true, false);
     case VoxelEvent::FREE_WITH_OTHER:
@@ -256,61 +249,6 @@ TEST(VoxelStates, WhatIsLeftOutIsFreeUntilABodyRestsThere) {
   first.look(OneVoxel::LEFT_OUT, true, false, 200);
   first.look(OneVoxel::OCCUPIED, true, false, 200);
   EXPECT_TRUE(first.isDoubted());
-}
-
-// Where the unknown is an obstacle what maps leave out is one, but for what is OWN and what a body hides since it was
-// FREE.
-TEST(VoxelStates, WhereTheUnknownIsAnObstacleEachCellHoldsOfWhatIsLeftOut) {
-  for (std::size_t s = 0; s < VOXEL_STATES; ++s) {
-    for (const VoxelEvent event : {VoxelEvent::OCCUPIED_WITH_OWNER, VoxelEvent::OCCUPIED_WITH_OTHER,
-                                   VoxelEvent::OCCUPIED_ALONE, VoxelEvent::OCCUPIED_AT_SEAM}) {
-      SCOPED_TRACE(std::string(STATES[s]) + ", left out, " + EVENTS[static_cast<std::size_t>(event)]);
-      const VoxelState state = static_cast<VoxelState>(s);
-      const bool is_own = nextState(state, event) == VoxelState::OWN;
-      EXPECT_EQ(is_own, event == VoxelEvent::OCCUPIED_WITH_OWNER &&
-                            (state == VoxelState::FREE || state == VoxelState::OWN || isLeft(state)));
-      OneVoxel world(true);
-      begin(world, state);
-      apply(world, state, event, true);
-      EXPECT_EQ(world.isOwn(), is_own);
-      EXPECT_EQ(world.isObstacle(), !is_own);
-      EXPECT_FALSE(world.isDoubted());
-      for (int looks = 0; looks < 8; ++looks) world.look(OneVoxel::LEFT_OUT, true, false);
-      EXPECT_EQ(world.isOwn(), is_own) << "it stays so, and what was lost does not come back with the body";
-      EXPECT_EQ(world.isObstacle(), !is_own);
-      world.look(OneVoxel::LEFT_OUT, false, false);
-      world.look(OneVoxel::LEFT_OUT, false, false);
-      EXPECT_TRUE(world.isObstacle()) << "nobody hides it, and nobody looks";
-      world.look(OneVoxel::LEFT_OUT, true, false);
-      EXPECT_TRUE(world.isObstacle()) << "the last look is too long ago";
-      world.look(OneVoxel::FREE, false, false);
-      world.look(OneVoxel::FREE, false, false);
-      world.look(OneVoxel::LEFT_OUT, true, false);
-      EXPECT_TRUE(world.isOwn()) << "it was seen free without a body";
-    }
-  }
-}
-
-TEST(VoxelStates, WhereTheUnknownIsAnObstacleWhatBecomesOccupiedIsOwnOnlyIfItWasHidden) {
-  OneVoxel hidden(true), shown_again(true), unlooked(true), gap(true);
-  for (OneVoxel* world : {&hidden, &shown_again, &unlooked, &gap}) world->look(OneVoxel::FREE, false, false);
-  hidden.look(OneVoxel::LEFT_OUT, true, false);
-  hidden.look(OneVoxel::OCCUPIED, true, false);
-  EXPECT_TRUE(hidden.isOwn());
-  shown_again.look(OneVoxel::LEFT_OUT, true, false);
-  shown_again.look(OneVoxel::FREE, true, false);
-  shown_again.look(OneVoxel::OCCUPIED, true, false);
-  EXPECT_TRUE(shown_again.isOwn());
-  unlooked.look(OneVoxel::LEFT_OUT, false, false);
-  unlooked.look(OneVoxel::OCCUPIED, true, false);
-  EXPECT_TRUE(unlooked.isDoubted()) << "with `free` it were its own";
-  gap.look(OneVoxel::FREE, true, false);
-  gap.look(OneVoxel::LEFT_OUT, true, false, 700);
-  EXPECT_TRUE(gap.isOwn()) << "it was there all along";
-  gap.look(OneVoxel::LEFT_OUT, false, false, 700);
-  gap.look(OneVoxel::FREE, false, false);
-  gap.look(OneVoxel::LEFT_OUT, true, false, 700);
-  EXPECT_TRUE(gap.isObstacle()) << "it came in a gap";
 }
 
 }  // namespace

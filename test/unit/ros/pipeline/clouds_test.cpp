@@ -229,33 +229,6 @@ TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
   EXPECT_FALSE(map.known->isKnown(Box{{0.05, 0.05, -0.15}, {0.4, 0.4, -0.1}})) << "under the table";
 }
 
-// In the octree it is free for ever: where the unknown is an obstacle that ends half a second after the last ray.
-TEST_F(Clouds, WhereTheUnknownIsAnObstacleWhatNoRayWentThroughOfLateIsNobodysOwn) {
-  for (const bool occupied : {true, false}) {
-    for (const int looks_elsewhere : {1, 3, 6, 9}) {
-      Seen owner(cloudScene("own_voxels_m: auto, unknown_box: [0.11, 0.11, 0.11, 0.29, 0.29, 0.39], unknown_space: " +
-                            std::string(occupied ? "occupied" : "free")));
-      owner.showCamera();
-      double now_s = 1;
-      const auto look = [&](const sensor_msgs::PointCloud2& cloud) { owner.give(owner.add(cloud)); };
-      owner.feed(now_s, 0.9f);
-      look(tableFrom(now_s));
-      for (int k = 0; k < looks_elsewhere; ++k) {
-        EXPECT_TRUE(assuranceOf(owner.feed(now_s += 0.1, 0.9f)).clear()) << describe(assuranceOf(owner.outcome));
-        look(cloudOf(now_s, {{-0.45f, 0.45f, 1}}));
-      }
-      owner.feed(now_s += 0.1, 0.35f);
-      look(
-          cloudOf(now_s, {{0.15f, -0.15f, 0.7f}, {0.15f, -0.25f, 0.7f}, {0.25f, -0.15f, 0.7f}, {0.25f, -0.25f, 0.7f}}));
-      const Outcome& near = owner.feed(now_s += 0.1, 0.35f);
-      const bool is_late = occupied && looks_elsewhere > 5;
-      EXPECT_EQ(assuranceOf(near).clear(), !is_late) << looks_elsewhere << ": " << describe(assuranceOf(near));
-      EXPECT_EQ(near.step->map.own.doubted, is_late ? 4u : 0u);
-      EXPECT_EQ(near.touching, Touching::NONE);
-    }
-  }
-}
-
 TEST_F(Clouds, AnOctreeThatIsTooLargeIsRefusedWithWhatToDo) {
   XmlRpcValue tree = cloudScene();
   tree["obstacle_resolution_m"] = 0.001;

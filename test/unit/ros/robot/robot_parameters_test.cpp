@@ -89,7 +89,7 @@ TEST(RobotParameters, LinksOwnTheVoxelsInWhichTheyAreSeen) {
   EXPECT_EQ(reach("robot: {description: d, own_voxels_m: 0.03}\n"), 0.03);
   EXPECT_EQ(reach("own_voxels_m: 0.01\nrobot: {description: d, own_voxels_m: 0}\n"), 0);
   EXPECT_EQ(reach("effects: {own_voxels: \"off\"}\nrobot: {description: d}\n"), 0);
-  EXPECT_EQ(reach("unknown_space: occupied\nunknown_box: [0, 0, 0, 1, 1, 1]\nrobot: {description: d}\n"), ONE_VOXEL);
+  EXPECT_EQ(reach("unknown_space: occupied\nunknown_box: [0, 0, 0, 1, 1, 1]\nrobot: {description: d}\n"), 0);
 }
 
 TEST(RobotParameters, GroupsAndLinksStandForTheirBodies) {
