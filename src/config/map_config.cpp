@@ -16,7 +16,6 @@ CloudSource readCloudSource(ParameterReader entry) {
   source.topic = entry.text("topic");
   source.camera_info = entry.text("camera_info", std::string());
   source.sensor_frame = entry.frame("sensor_frame");
-  source.leaves_out_flying = entry.choice("flying_pixels", "fill", {"fill", "leave_out"}) == "leave_out";
   entry.finish();
   return source;
 }

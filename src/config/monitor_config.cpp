@@ -205,10 +205,6 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
   add(Effect::MINIMUM_SEPARATION, largestSeparation(config.monitorBodies()) > 0 ? "the minimum separation" : "");
   add(Effect::TRACKER_NOISE, any_uncertain ? "the uncertainty of positions" : "");
   add(Effect::UNKNOWN_SPACE, config.unknown_space != UnknownSpace::FREE ? "unknown_space" : "");
-  for (const CloudSource& source : config.clouds) {
-    if (!source.leaves_out_flying) continue;
-    sentences.push_back("pixels between two depths on " + source.topic + " by flying_pixels: leave_out");
-  }
   return sentences;
 }
 

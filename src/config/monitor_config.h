@@ -48,9 +48,8 @@ struct BodyConfig {
 /// told by the topic and the frame_id of its messages.
 struct CloudSource {
   std::string topic;
-  std::string camera_info;         ///< topic of a depth picture's CameraInfo; empty: camera_info beside the picture's
-  std::string sensor_frame;        ///< where the sensor is whose clouds come in the map's own frame; empty: nobody says
-  bool leaves_out_flying = false;  ///< octomap/flying_pixels.h
+  std::string camera_info;   ///< topic of a depth picture's CameraInfo; empty: camera_info beside the picture's
+  std::string sensor_frame;  ///< where the sensor is whose clouds come in the map's own frame; empty: nobody says
 };
 
 /// The parameters under `intent`: of ~intended.

@@ -13,7 +13,6 @@
 #include "input/transform_tracks.h"
 #include "input/wire.h"
 #include "node/map_decode.h"
-#include "octomap/flying_pixels.h"
 
 namespace dccd {
 
@@ -237,12 +236,7 @@ SensorView CloudMapping::read(const CloudMessage& message, Reading& reading) {
     const double late_s = secondsBetween(reading.map.stamp_ns, known->second.stamp_ns);
     throw WireError("it is stamped " + std::to_string(late_s) + " s before one from there that is in the map");
   }
-  const SensorView seen =
-      isDepthPicture(message.datatype) ? readPicture(message, reading) : readCloudOf(message, reading);
-  if (config_.clouds[message.source].leaves_out_flying) {
-    leaveOutFlying(numbers_, seen.width, seen.depth_m ? 1 : 3, config_.cloud_map.resolution_m);
-  }
-  return seen;
+  return isDepthPicture(message.datatype) ? readPicture(message, reading) : readCloudOf(message, reading);
 }
 
 void CloudMapping::insert(const SensorView& seen, Reading& reading) {

@@ -31,13 +31,11 @@ TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
   EXPECT_TRUE(with("obstacle_cloud_topic: /points").takesClouds());
   EXPECT_TRUE(with("obstacle_resolution_m: 0.02").namesOctomap());
   const MonitorConfig two = with(
-      "obstacle_cloud_topics: [/a, {topic: /b, camera_info: /info, sensor_frame: /lens, flying_pixels: leave_out}], "
-      "obstacle_box: [0, 0, 0, 1, 2, 3]");
+      "obstacle_cloud_topics: [/a, {topic: /b, camera_info: /info, sensor_frame: /lens}], obstacle_box: [0, 0, 0, "
+      "1, 2, 3]");
   EXPECT_TRUE(two.takesClouds());
   EXPECT_EQ(two.mapName(), "/a, /b");
   EXPECT_EQ(two.clouds.at(1).camera_info + " " + two.clouds.at(1).sensor_frame, "/info lens");
-  EXPECT_FALSE(two.clouds.at(0).leaves_out_flying);
-  EXPECT_TRUE(two.clouds.at(1).leaves_out_flying);
   EXPECT_EQ(two.cloud_map.box->max, Vec3(1, 2, 3));
   EXPECT_FALSE(none.takesClouds()) << "a default names nothing";
   EXPECT_FALSE(with("octomap_topic: /map, effects: {octomap: \"off\"}").namesOctomap());

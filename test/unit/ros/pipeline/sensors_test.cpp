@@ -575,27 +575,6 @@ TEST(Sensors, AStepThatTouchesWhatWasSeenTooSeldomIsNotProved) {
   EXPECT_FALSE(camera.feed(1.5, 0.35f).contacts.empty()) << "it was seen again";
 }
 
-// What such a pixel says is of no thing, but only who runs the cell may say so: what is proved rests on it.
-TEST(Sensors, APixelThatFliesAlongAnEdgeIsLeftOutByChoiceAlone) {
-  const Depth edge = [](std::uint32_t column, std::uint32_t) { return column < 20 ? 0.5f : 1.0f; };
-  const Depth flies = [&](std::uint32_t column, std::uint32_t row) {
-    return column == 20 && row == 30 ? 0.75f : edge(column, row);
-  };
-  for (const bool is_left_out : {false, true}) {
-    for (const bool in_points : {false, true}) {
-      Camera camera(is_left_out ? "obstacle_cloud_topics: [{topic: /points, flying_pixels: leave_out}]" : "");
-      for (int i = 0; i < 4; ++i) camera.give(camera.add(pictureOf(1, edge)));
-      LoadedMap map = in_points ? camera.add(pointsOf(1.1, flies)) : camera.add(pictureOf(1.1, flies));
-      EXPECT_EQ(map.own.doubted_surface == nullptr, is_left_out);
-      camera.give(std::move(map));
-      camera.feed(1, 0.9f);
-      const std::vector<std::string> excluded = camera.feed(1.1, 0.9f).excluded;
-      const std::string said = "pixels between two depths on /points by flying_pixels: leave_out";
-      EXPECT_EQ(std::count(excluded.begin(), excluded.end(), said), is_left_out ? 1 : 0);
-    }
-  }
-}
-
 /// The table, and 0.35 above it up to four points, in voxels beside each other.
 sensor_msgs::PointCloud2 tableAndGroup(std::size_t points, double stamp_s) {
   sensor_msgs::PointCloud2 cloud = tableFrom(stamp_s);
