@@ -139,10 +139,8 @@ target_precompile_headers(deformable_ccd_live_support PRIVATE <gtest/gtest.h> <r
 # Two tests are about the order in which headers are read.
 set_source_files_properties(test/unit/ros/include_order_core_first_test.cpp test/unit/ros/include_order_messages_first_test.cpp
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
-add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES} test/unit/allocations.cpp
+add_gtest_suite(ros_tests HEADERS_OF deformable_ccd_live_support SOURCES ${ros_SOURCES}
   LIBRARIES deformable_ccd_live_support deformable_ccd_ros ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
-# The compiler is not to see whose operator new and delete these are.
-set_source_files_properties(test/unit/allocations.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 # These six name what they write and read alike, or are about the order of headers.
 set_source_files_properties(test/unit/ros/hostile_input_test.cpp test/unit/ros/include_order_core_first_test.cpp
   test/unit/ros/include_order_messages_first_test.cpp test/unit/ros/mesh_decoder_test.cpp

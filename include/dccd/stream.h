@@ -100,8 +100,6 @@ class DCCD_EXPORT Monitor {
   /// be bodies().size(), which adds one. All that is known of the other bodies stays. Push what steps to come begin
   /// with, at stampsToCome(), or the next step waits for it. Throws std::invalid_argument; all then stays.
   void setBody(std::size_t body, Body what);
-  /// With these options, of which the same holds as of setOptions(): both, or neither.
-  void setBody(std::size_t body, Body what, const MonitorOptions& options);
   /// Where steps to come begin and end, as far as that is known, ascending.
   std::vector<StampNs> stampsToCome() const;
 

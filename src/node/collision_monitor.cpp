@@ -237,8 +237,7 @@ void CollisionMonitor::Impl::start() {
   master = std::make_unique<MasterWatch>(
       mesh_subscriptions, map_subscribers, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
   master->watchParameters(config.robot.parameters, [this](const std::vector<std::string>& changed) {
-    queue.command([this, changed, now = callTime()] {
-      pipeline.callsComeAt(now);
+    queue.command([this, changed] {
       for (const std::string& sentence : pipeline.robotChanged(changed))
         log.complain(config.monitor.clock_body, "robot", sentence);
     });

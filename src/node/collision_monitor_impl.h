@@ -106,7 +106,6 @@ struct CollisionMonitor::Impl {
   void listenToCameraInfo(std::size_t source);
 
   // Service thread.
-  static MonitorPipeline::CallTime callTime();
   Reply ask(const std::function<Reply()>& run);
   void advertiseServices(ros::NodeHandle& service);
   void advertiseExpectations(ros::NodeHandle& service);

@@ -58,12 +58,10 @@ void EffectTracker::hearDistances(bool heard, bool drawn) {
 }
 
 void EffectTracker::setBody(std::size_t body, const Body& what) {
-  EffectScene scene = scene_;
-  scene.bodies.resize(std::max(scene.bodies.size(), body + 1));
-  scene.noise.resize(scene.bodies.size());
-  scene.bodies[body] = what;
-  plan_ = EffectPlan(scene, settings_);
-  scene_ = std::move(scene);
+  scene_.bodies.resize(std::max(scene_.bodies.size(), body + 1));
+  scene_.noise.resize(scene_.bodies.size());
+  scene_.bodies[body] = what;
+  plan_ = EffectPlan(scene_, settings_);
 }
 
 bool EffectTracker::decide(MonitorOptions& options) const {

@@ -32,7 +32,7 @@ class EffectTracker {
   void hearDistances(bool heard, bool drawn = false);
   /// Somebody may read each of them.
   bool areAllDistancesRead() const { return all_read_; }
-  /// A body has come, or is another one. All or nothing.
+  /// A body has come, or is another one.
   void setBody(std::size_t body, const Body& what);
   /// Sets what the plan decides of a monitor's options. False: they are so already.
   bool decide(MonitorOptions& options) const;

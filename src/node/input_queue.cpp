@@ -1,6 +1,5 @@
 #include "node/input_queue.h"
 
-#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -84,13 +83,11 @@ void InputQueue::command(std::function<void()> run) {
   changed_.notify_one();
 }
 
-Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s, bool may_be_late) {
-  const auto is_settled = std::make_shared<std::atomic<bool>>(false);  // whether it is carried out
+Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s) {
   auto promise = std::make_shared<std::promise<Reply>>();
   std::future<Reply> future = promise->get_future();
   // The command alone holds the promise: dropped, it breaks it, and the wait ends.
-  command([promise = std::move(promise), run, is_settled] {
-    if (is_settled->exchange(true)) return;
+  command([promise = std::move(promise), run] {
     try {
       promise->set_value(run());
     } catch (const std::exception& error) {
@@ -98,9 +95,7 @@ Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s, bool
     }
   });
   if (future.wait_for(std::chrono::duration<double>(timeout_s)) != std::future_status::ready) {
-    if (may_be_late) return {false, "the worker is busy with a step; this will be done after it"};
-    if (!is_settled->exchange(true)) return {false, "the worker is busy with a step; this will not be done"};
-    // It has just been begun, and its own answer is the true one.
+    return {false, "the worker is busy with a step; this will be done after it"};
   }
   try {
     return future.get();

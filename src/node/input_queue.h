@@ -43,8 +43,8 @@ class InputQueue {
   /// For the worker to run between steps.
   void command(std::function<void()> run);
   /// The same, and waits for the answer. Without success: what `run` throws, in words; a timeout, after which the
-  /// command is still carried out when its turn comes, or, unless it `may_be_late`, is not; a closed queue.
-  Reply call(const std::function<Reply()>& run, double timeout_s, bool may_be_late = true);
+  /// command is still carried out when its turn comes; a closed queue.
+  Reply call(const std::function<Reply()>& run, double timeout_s);
   /// The worker has ended: what it has not run is dropped, and so is all that follows, so that no call waits for it.
   void close();
   /// Waits for a message, a command, a wake-up or the timeout; returns the commands that arrived.

@@ -2,7 +2,6 @@
 // come and go as bodies.
 #include <algorithm>
 #include <optional>
-#include <type_traits>
 #include <utility>
 
 #include "node/monitor_pipeline.h"
@@ -54,34 +53,16 @@ void MonitorPipeline::attach(AttachedObject object) {
   rigid.name = object.name;
   rigid.frame = object.frame;
   rigid.may_be_lost = true;
+  setBody(first + number, body, std::move(rigid));
   attached_.resize(std::max(count, number + 1));
   attached_[number] = Attached{std::move(object), true};
+  voidWhatWasSaid("object '" + body.name + "' was attached");
   try {
-    setBody(first + number, body, std::move(rigid), "object '" + body.name + "' was attached");
+    expectNow(config_.phase);
   } catch (...) {
-    attached_[number].reset();
+    remove(body.name);
     throw;
   }
-}
-
-/// What may fail comes first.
-void MonitorPipeline::setBody(std::size_t body, const Body& what, Rigid rigid, const std::string& why) {
-  static_assert(std::is_nothrow_move_assignable_v<EffectTracker>);
-  std::vector<Body> bodies = monitor_->bodies();
-  bodies.resize(std::max(bodies.size(), body + 1));
-  bodies[body] = what;
-  Expected tried = expectedOf(config_.phase, bodies), kept = tried;
-  MonitorOptions options = monitor_->options();
-  tried.swapInto(options);
-  EffectTracker effects = effects_;
-  effects.setBody(body, what);
-  rigid_.resize(std::max(rigid_.size(), bodies.size()));
-  monitor_->setBody(body, what, options);
-  effects_ = std::move(effects);
-  rigid_[body] = std::move(rigid);
-  kept.swapInto(config_.monitor);
-  voidWhatWasSaid(why);
-  placeToCome(body);
 }
 
 void MonitorPipeline::detach(const std::string& name) {
@@ -91,37 +72,28 @@ void MonitorPipeline::detach(const std::string& name) {
   if (!checked_[config_.monitor.clock_body]) {
     throw ParameterError("object '" + name + "' stays attached: no frame of the clock body has come yet");
   }
-  const std::string why = "object '" + name + "' was detached";
+  voidWhatWasSaid("object '" + name + "' was detached");
   attached_[number]->held = false;
-  try {
-    expectNow(config_.phase, why);
-  } catch (...) {
-    attached_[number]->held = true;
-    throw;
-  }
-  rigid_[config_.bodies.size() + number]->let_go_ns = stampOf(call_);
-  voidWhatWasSaid(why);
+  rigid_[config_.bodies.size() + number]->let_go_ns = changedAt(newest_ns_);
+  expectNow(config_.phase);
 }
 
 void MonitorPipeline::remove(const std::string& name) {
   const std::size_t number = attachedNumber(name);
   if (number == attached_.size()) throw ParameterError("object '" + name + "' is not there");
   static const auto NOTHING = share(Topology::fromTriangles(0, {}));
-  Body nobody;  // in its place
+  voidWhatWasSaid("object '" + name + "' was removed");
+  attached_[number].reset();
+  expectNow(config_.phase);  // before the body that is expected is gone
+  Body nobody;               // in its place
   nobody.self_collision = nobody.against_bodies = nobody.against_obstacle = false;
   Rigid none;
   none.mesh.topology = NOTHING;
-  std::optional<Attached> gone = std::exchange(attached_[number], std::nullopt);
-  try {
-    setBody(config_.bodies.size() + number, nobody, std::move(none), "object '" + gone->object.name + "' was removed");
-  } catch (...) {
-    attached_[number] = std::move(gone);
-    throw;
-  }
+  setBody(config_.bodies.size() + number, nobody, std::move(none));
 }
 
 void MonitorPipeline::setHold(const std::string& body, const std::string& by, bool closed) {
-  std::vector<Hold> before = config_.holds;
+  const std::vector<Hold> before = config_.holds;
   std::string known;
   bool any = false;
   for (Hold& hold : config_.holds) {
@@ -138,7 +110,7 @@ void MonitorPipeline::setHold(const std::string& body, const std::string& by, bo
   try {
     expectNow(config_.phase);
   } catch (...) {
-    config_.holds = std::move(before);
+    config_.holds = before;
     throw;
   }
 }
@@ -148,9 +120,8 @@ void MonitorPipeline::setPhase(const std::string& phase) {
   if (!phase.empty() && std::find(known.begin(), known.end(), phase) == known.end()) {
     throw ParameterError("phase '" + phase + "' is unknown; " + config_.phasesInWords());
   }
-  std::string next = phase;
-  expectNow(next);
-  config_.phase = std::move(next);
+  expectNow(phase);
+  config_.phase = phase;
 }
 
 std::string MonitorPipeline::phaseInWords() const {
@@ -161,38 +132,29 @@ std::string MonitorPipeline::phaseInWords() const {
   return text;
 }
 
-void MonitorPipeline::Expected::swapInto(MonitorOptions& options) noexcept {
-  options.detector.expected.swap(expected);
-  options.held.swap(held);
-  options.detector.excluded.swap(excluded);
-}
-
-MonitorPipeline::Expected MonitorPipeline::expectedOf(const std::string& phase, const std::vector<Body>& bodies) const {
-  Expected now{config_.expectedIn(phase), config_.held(), excluded_};
+/// What is expected in the phase, of what hands hold, and of what is attached; and what of that is not looked at.
+void MonitorPipeline::expectNow(const std::string& phase) {
+  std::vector<Expectation> expected = config_.expectedIn(phase);
+  std::vector<std::string> excluded = excluded_;
   bool any = false;
   for (std::size_t i = 0; i < attached_.size(); ++i) {
     if (!attached_[i]) continue;
     any = true;
     const std::size_t body = config_.bodies.size() + i;
     for (const std::uint16_t other : attached_[i]->object.expected) {
-      if (!attached_[i]->held || !meet(bodies[body], body, bodies[other], other)) continue;
-      Expectation& one = now.expected.emplace_back();
+      if (!attached_[i]->held || !meet(monitor_->bodies()[body], body, monitor_->bodies()[other], other)) continue;
+      Expectation& one = expected.emplace_back();
       one.partners[0].body = static_cast<std::uint16_t>(body);
       one.partners[1].body = other;
     }
   }
   if (any && !config_.robot_asked.against_links)
-    now.excluded.push_back("what is attached against links and against each other");
-  return now;
-}
-
-void MonitorPipeline::expectNow(const std::string& phase, const std::string& why) {
-  Expected tried = expectedOf(phase, monitor_->bodies()), kept = tried;
-  bool is_tried = false;
-  const auto change = [&](MonitorOptions& options, MarkerConfig&) {
-    (std::exchange(is_tried, true) ? kept : tried).swapInto(options);
-  };
-  reconfigure(change, why);
+    excluded.push_back("what is attached against links and against each other");
+  reconfigure([&](MonitorOptions& options, MarkerConfig&) {
+    options.detector.expected = expected;
+    options.held = config_.held();
+    options.detector.excluded = excluded;
+  });
 }
 
 }  // namespace dccd

@@ -63,7 +63,7 @@ void MonitorPipeline::answerForCell(std::int64_t came_ns, std::int64_t now_ns, O
   claim.answer(Question::MAP_PLACE, mapPlaceProblem(*outcome.step));
   claim.answer(Question::TRANSFORMS, transformsProblems());
   // Frames that were on their way when something was let go show it held, and contacts before a phase are not of it.
-  const bool is_of_before = !changed_.empty() && outcome.step->start_ns < since_ns_;
+  const bool is_of_before = !changed_.empty() && outcome.step->start_ns < changedAt(outcome.step->stamp_ns);
   claim.answer(Question::CALLS, is_of_before ? "after this step began " + changed_ : "");
   claim.answer(Question::FIXED_FRAME, learntFramesProblems(*outcome.step));
   answerForClocks(*outcome.step, claim);
@@ -151,24 +151,13 @@ void MonitorPipeline::answerForClocks(const Step& step, Claim& claim) const {
   claim.answer(Question::TRANSFORM_CLOCKS, sentences);
 }
 
-StampNs MonitorPipeline::stampOf(const CallTime& call) const {
-  const Source& clock = sources_[config_.monitor.clock_body];
-  if (call.stamp_ns == 0) return clock.stamp_ns;
-  return call.stamp_ns + std::llround(1e9 * std::max(0.0, clock.lead.seconds().value_or(0)));
-}
-
-/// Stamps that are far from the call are of another time, as in a bag that is played without its clock: what came after
-/// the call is of after it.
-bool MonitorPipeline::isOfAfter(const Waiting& frame) const {
+/// Stamps that are far from the call are of another time, as in a bag that is played without its clock.
+StampNs MonitorPipeline::changedAt(StampNs stamp_ns) const {
   constexpr double OTHER_TIME_S = 10;
-  const StampNs stamp_ns = frame.mesh.stamp_ns, call_ns = changed_at_.stamp_ns, at_ns = stampOf(changed_at_);
-  if (frame.mesh.arrival_ns <= changed_at_.arrival_ns) return false;
-  const double off_s = std::abs(secondsBetween(call_ns, stamp_ns)), ahead_s = secondsBetween(call_ns, at_ns);
-  if (call_ns == 0 || off_s > OTHER_TIME_S + ahead_s || stamp_ns >= at_ns) return true;
-  // Time began anew since: after a frame that was of after the call, or before one was.
-  if (since_ns_ != NOT_YET && secondsBetween(stamp_ns, since_ns_) > tolerance::LATE_FRAME_S) return true;
-  const bool is_stamped_now = secondsBetween(frame.receipt_ns, stamp_ns) <= MOST_AHEAD_S;
-  return is_stamped_now && secondsBetween(frame.receipt_ns, call_ns) > tolerance::LATE_FRAME_S;
+  const double ahead_s = std::max(0.0, sources_[config_.monitor.clock_body].lead.seconds().value_or(0));
+  const bool is_other_time =
+      changed_ns_ == 0 || std::abs(secondsBetween(changed_ns_, stamp_ns)) > OTHER_TIME_S + ahead_s;
+  return is_other_time ? newest_ns_ : changed_ns_ + std::llround(ahead_s * 1e9);
 }
 
 bool MonitorPipeline::hasLetGo() const {

@@ -60,7 +60,6 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
   waiting.since_ns = message.since_ns < 0 ? message.arrival_ns : message.since_ns;
-  waiting.receipt_ns = message.receipt_ns;
   const auto refuse = [&](StepStatus status, const std::string& reason) {
     monitor_->countReceived(body);
     skip(body, status, message.receipt_ns, message.arrival_ns, reason);
@@ -102,7 +101,8 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
   const double back_s = sources_[body].hear(waiting.mesh, message);
-  if (body == config_.monitor.clock_body && back_s > tolerance::LATE_FRAME_S) beginAnew(waiting.mesh.stamp_ns);
+  if (body == config_.monitor.clock_body && back_s > tolerance::LATE_FRAME_S)
+    transforms_.beginAnew(waiting.mesh.stamp_ns);
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changes;
   points_no_measurement_ += waiting.mesh.no_measurement;
@@ -125,8 +125,7 @@ void MonitorPipeline::keepHint(std::size_t body, const DecodedMesh& mesh, bool i
   hints_[body] = joined(joined(file_hints_[body], doubts_[body]), meshHint(mesh));
 }
 
-void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change,
-                                  const std::string& why) {
+void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change) {
   MonitorOptions options = config_.monitor;
   MarkerConfig markers = config_.markers;
   change(options, markers);
@@ -135,23 +134,16 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
   monitor_->setOptions(options);
   // In place, so that nothing else is written: the threads of topics and maps read the rest of it meanwhile.
   change(config_.monitor, config_.markers);
-  if (expects_others) voidWhatWasSaid(why);
+  if (expects_others) voidWhatWasSaid("other contacts are expected now");
 }
 
-void MonitorPipeline::voidWhatWasSaid(const std::string& why) noexcept {
-  const auto tell = [this](const std::string& what) {
-    promises_.revoke(what);
-    changed_ = what;
-    if (voided_.empty()) voided_ = what;  // the first reason: what else changes follows from it
-  };
-  try {
-    tell(why);
-  } catch (const std::bad_alloc&) {
-    tell("a call came");  // so short that it takes no memory
-  }
+void MonitorPipeline::voidWhatWasSaid(const std::string& why) {
+  promises_.revoke(why);
   answered_.reset();
-  changed_at_ = call_;
-  since_ns_ = call_.arrival_ns < 0 && call_.stamp_ns == 0 ? stampOf(call_) : NOT_YET;
+  changed_ = why;
+  changed_ns_ = call_ns_;
+  newest_ns_ = sources_[config_.monitor.clock_body].stamp_ns;
+  if (voided_.empty()) voided_ = why;  // the first reason: what else changes follows from it
 }
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {

@@ -41,8 +41,6 @@ using TopologyFilter =
 
 class MonitorPipeline {
  public:
-  static constexpr const char* OTHERS_EXPECTED = "other contacts are expected now";
-
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file, or the
   /// effect that is asked for and that the scene cannot have. `map_source`: as EffectTracker's.
   MonitorPipeline(MonitorConfig config, TransformFeed& transforms, const std::string& map_source = {});
@@ -90,10 +88,9 @@ class MonitorPipeline {
   Outcome checkNow(std::int64_t now_ns);
 
   /// Changes what can be changed while it runs. `change` is called twice, with a copy and, once all of it holds, with
-  /// the options themselves, of which it writes nothing but what it changes; then it may not fail. `why`: what is void
-  /// where other contacts are expected now. Throws std::invalid_argument naming the option; all then stays.
-  void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change,
-                   const std::string& why = OTHERS_EXPECTED);
+  /// the options themselves, of which it writes nothing but what it changes. Throws std::invalid_argument naming the
+  /// option; all then stays.
+  void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
 
   /// The phase of the task that is on from the next step on. Throws ParameterError naming those that there are; all
   /// then stays.
@@ -127,13 +124,9 @@ class MonitorPipeline {
   /// What the last outcome promises, and what became of the promise before; nothing where the configuration has no
   /// bounds.
   const PromiseWatch& promises() const { return promises_; }
-  /// When a call was made: steps that began before prove nothing of what it changes.
-  struct CallTime {
-    StampNs stamp_ns = 0;          ///< 0: nobody knows it
-    std::int64_t arrival_ns = -1;  ///< on the clock of arrivals; negative: after all that was taken
-  };
-  /// Of the calls from now on.
-  void callsComeAt(const CallTime& time) { call_ = time; }
+  /// What calls change from now on, they change at this stamp: steps that began before prove nothing. 0: nobody knows
+  /// it, and they change it at the newest one that had come.
+  void callsComeAt(StampNs stamp_ns) { call_ns_ = stamp_ns; }
   /// Why what was said of the last outcome is void, since the last call: a call has changed what it rests on. Empty: it
   /// stands.
   std::string takeVoided() { return std::exchange(voided_, {}); }
@@ -210,8 +203,7 @@ class MonitorPipeline {
     bool overdue = false;  // past transform_timeout_s
     bool kept = false;     // that, or one before it was: a static body sends its only frame once, and steps do not wait
     bool told = false;     // the problem about it has been set
-    StampNs receipt_ns = 0;
-    std::string reason;  // why it has no place yet
+    std::string reason;    // why it has no place yet
   };
   struct Attached {
     AttachedObject object;
@@ -235,10 +227,9 @@ class MonitorPipeline {
   std::optional<Outcome> answered_;  // the newest answer, where somebody listens to what is intended
   bool intends_anew_ = false;        // since then
   std::string voided_;
-  static constexpr StampNs NOT_YET = std::numeric_limits<StampNs>::max();
-  CallTime call_, changed_at_;  // the latter of the last call that changed something
-  std::string changed_;         // what it did
-  StampNs since_ns_ = NOT_YET;  // the first stamp of after that
+  StampNs call_ns_ = 0, changed_ns_ = 0;  // the latter of the last call that changed something,
+  StampNs newest_ns_ = 0;                 // and the clock body's newest stamp then
+  std::string changed_;                   // what it did
   Statement statement_;
   std::vector<StampNs> widened_ns_;                 // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;                        // a static body of which the monitor has a frame
@@ -297,7 +288,7 @@ class MonitorPipeline {
   /// Whether the map was occupied along a body when they first met, of each once: a camera's may hold the body itself.
   void doubtMap(const Outcome& outcome);
   void keepHint(std::size_t body, const DecodedMesh& mesh, bool is_new);
-  void voidWhatWasSaid(const std::string& why) noexcept;
+  void voidWhatWasSaid(const std::string& why);
   void setRigid(std::size_t body, const MeshResource& mesh);
   static Rigid rigidOf(const MeshResource& mesh);
   /// The parameter that one of the expectations is from.
@@ -338,10 +329,8 @@ class MonitorPipeline {
   /// Says of an outcome with a map of clouds which of them are not in it.
   void nameMissedClouds(Outcome& outcome) const;
   std::string newerMapProblem(std::int64_t came_ns, std::int64_t now_ns, const ObstacleMap& map) const;
-  /// By the clock of the clock body's stamps.
-  StampNs stampOf(const CallTime& call) const;
-  /// Whether this frame of the clock body, the next one, shows what was after the last call that changed something.
-  bool isOfAfter(const Waiting& frame) const;
+  /// When the last call changed something, by the clock of stamps such as this one.
+  StampNs changedAt(StampNs stamp_ns) const;
   std::string sendersProblem(std::size_t body) const;
   std::vector<std::string> transformsProblems();
   std::string numberingProblem(std::size_t body) const;
@@ -355,25 +344,14 @@ class MonitorPipeline {
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one. Once it is
   /// overdue, links of a robot that have no transform stand in nobody's way any longer.
   bool placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
-  /// Where it is at the stamp. False: nobody knows. epoch: of tracks_, as it was before. is_of_after: the last call.
-  bool placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, bool is_of_after, MeshFrame& frame,
-                std::string& reason) const;
-  /// Time begins anew at this stamp, and tf forgets where things were let go.
-  void beginAnew(StampNs stamp_ns);
+  /// Where it is at the stamp. False: nobody knows. epoch: of tracks_, as it was before.
+  bool placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame, std::string& reason) const;
   Carrier carrierOf(const std::string& frame, std::uint64_t epoch) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
-  /// What is expected, of what hands hold, and of what is attached; and what of that is not looked at.
-  struct Expected {
-    std::vector<Expectation> expected, held;
-    std::vector<std::string> excluded;
-    void swapInto(MonitorOptions& options) noexcept;
-  };
-  Expected expectedOf(const std::string& phase, const std::vector<Body>& bodies) const;
-  void expectNow(const std::string& phase, const std::string& why = OTHERS_EXPECTED);
-  /// A body is another one from the next step on, by what is attached now. All or nothing.
-  void setBody(std::size_t body, const Body& what, Rigid rigid, const std::string& why);
-  void placeToCome(std::size_t body);
+  /// A body is another one from the next step on.
+  void setBody(std::size_t body, const Body& what, Rigid rigid);
   std::size_t attachedNumber(const std::string& name) const;
+  void expectNow(const std::string& phase);
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
   /// What the monitor is to have of it: the map in its place, or why there is none. False: no place yet.

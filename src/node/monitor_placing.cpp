@@ -18,7 +18,7 @@ Carrier MonitorPipeline::carrierOf(const std::string& frame, std::uint64_t epoch
   return {frame == fixed_frame_ ? std::string() : frame, epoch};
 }
 
-bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, bool is_of_after, MeshFrame& frame,
+bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epoch, MeshFrame& frame,
                                std::string& reason) const {
   frame = rigid.mesh;
   frame.stamp_ns = stamp_ns;
@@ -35,8 +35,8 @@ bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epo
     return false;
   }
   frame.pose = frame.pose * rigid.frame_from_mesh;
-  if (is_of_after && rigid.let_go_ns != Rigid::NEVER) {  // it stays where it was then
-    if (rigid.doubt.empty()) rigid.doubt = tracks_.doubtAt(fixed_frame_, rigid.frame, held_ns);
+  if (stamp_ns >= rigid.let_go_ns) {  // it stays where it was then
+    rigid.doubt = tracks_.doubtAt(fixed_frame_, rigid.frame, held_ns);
     if (rigid.doubt.empty()) rigid.doubt = transforms_.doubtNextTo(fixed_frame_, rigid.frame, held_ns);
     rigid.frame_from_mesh = frame.pose;
     rigid.frame = fixed_frame_;
@@ -46,18 +46,6 @@ bool MonitorPipeline::placeOne(Rigid& rigid, StampNs stamp_ns, std::uint64_t epo
   frame.doubt = rigid.doubt;
   frame.positions = transformed(frame.pose, rigid.reference);
   return true;
-}
-
-void MonitorPipeline::beginAnew(StampNs stamp_ns) {
-  for (std::optional<Rigid>& rigid : rigid_) {
-    const bool is_held = !rigid || rigid->let_go_ns == Rigid::NEVER;
-    if (is_held || secondsBetween(stamp_ns, rigid->let_go_ns) <= tolerance::LATE_FRAME_S) continue;
-    MeshFrame there;
-    std::string reason;
-    if (placeOne(*rigid, rigid->let_go_ns, tracks_.epoch(), true, there, reason)) continue;
-    rigid->doubt = "time went back before tf had come to where it was let go";
-  }
-  transforms_.beginAnew(stamp_ns);
 }
 
 /// lost: why it has no place; empty: it has.
@@ -80,9 +68,7 @@ bool MonitorPipeline::placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool
     reason = missing(body);
     return false;
   }
-  const Waiting& clock = *waiting_[config_.monitor.clock_body];
-  const StampNs stamp_ns = clock.mesh.stamp_ns;
-  const bool is_of_after = isOfAfter(clock);
+  const StampNs stamp_ns = waiting_[config_.monitor.clock_body]->mesh.stamp_ns;
   struct Placed {
     std::size_t body;
     MeshFrame frame;
@@ -93,7 +79,7 @@ bool MonitorPipeline::placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
     Placed& one = all.emplace_back(Placed{b, {}, {}});
-    if (!placeOne(*rigid_[b], stamp_ns, epoch, is_of_after, one.frame, reason)) {
+    if (!placeOne(*rigid_[b], stamp_ns, epoch, one.frame, reason)) {
       if (!overdue || !rigid_[b]->may_be_lost) return false;
       one.lost = reason;
     }
@@ -102,15 +88,18 @@ bool MonitorPipeline::placeOthers(std::uint64_t epoch, std::int64_t now_ns, bool
   return true;
 }
 
-/// So that the next step is answered with it; should memory end, that one has no place of it, and is not answered.
-void MonitorPipeline::placeToCome(std::size_t body) try {
+void MonitorPipeline::setBody(std::size_t body, const Body& what, Rigid rigid) {
+  monitor_->setBody(body, what);
+  effects_.setBody(body, what);
+  rigid_.resize(std::max(rigid_.size(), body + 1));
+  rigid_[body] = std::move(rigid);
+  // So that the next one is answered with it.
   for (const StampNs stamp_ns : monitor_->stampsToCome()) {
     MeshFrame frame;
     std::string reason;
-    const bool placed = placeOne(*rigid_[body], stamp_ns, tracks_.epoch(), false, frame, reason);
+    const bool placed = placeOne(*rigid_[body], stamp_ns, tracks_.epoch(), frame, reason);
     pushRigid(body, std::move(frame), placed ? "" : reason, 0);
   }
-} catch (const std::bad_alloc&) {
 }
 
 void MonitorPipeline::keep(std::size_t body) {
@@ -205,9 +194,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   }
   transform(fixed_from_mesh, done.mesh.positions);
   widen(body, done.mesh);
-  const StampNs since_ns = is_clock && isOfAfter(done) ? std::min(since_ns_, done.mesh.stamp_ns) : since_ns_;
   monitor_->push(body, std::move(done.mesh), now_ns);
-  since_ns_ = since_ns;  // from here on steps of a time before are dropped
   placed_[body] = isStatic(body);
   return true;
 }

@@ -36,15 +36,10 @@ ros::ServiceServer advertise(ros::NodeHandle& node, const char* name, const Answ
 
 }  // namespace
 
-/// A call counts from when it is made, however long the worker is busy.
-MonitorPipeline::CallTime CollisionMonitor::Impl::callTime() {
-  return {static_cast<StampNs>(ros::Time::now().toNSec()), steadyNs()};
-}
-
 /// What the call made void is so before its caller hears that it was done.
 Reply CollisionMonitor::Impl::ask(const std::function<Reply()>& run) {
-  const auto command = [this, run, now = callTime()] {
-    pipeline.callsComeAt(now);
+  const auto command = [this, run] {
+    pipeline.callsComeAt(static_cast<StampNs>(ros::Time::now().toNSec()));
     const Reply reply = run();
     publishVoided();
     return reply;
@@ -153,13 +148,16 @@ void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
 void CollisionMonitor::Impl::listenToChanges(const ros::NodeHandle& service) {
   Reconfigure::Events events;
   events.change = [this](const Reconfigure::Change& change) -> std::string {
-    const auto run = [this, change] {
+    // Nobody knows what a worker will say that is busy for too long: then it is not to do it any more.
+    const auto is_wanted = std::make_shared<std::atomic<bool>>(true);
+    const auto run = [this, change, is_wanted] {
+      if (!*is_wanted) return Reply{};
       pipeline.reconfigure(change);
       state.setLimits(livenessLimits(config));
       return Reply{true, ""};
     };
-    // Nobody knows what a worker will say that is busy for too long: then it is not to do it any more.
-    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S, false);
+    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+    *is_wanted = false;
     return reply.success ? "" : reply.message;
   };
   events.refused = [this](const std::string& why) {

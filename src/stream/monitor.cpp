@@ -5,7 +5,6 @@
 #include <new>
 #include <set>
 #include <stdexcept>
-#include <type_traits>
 #include <utility>
 
 #include "step/history.h"
@@ -87,23 +86,13 @@ double Monitor::stepMs() const {
 const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
 
 void Monitor::setOptions(const MonitorOptions& options) {
-  MonitorOptions next = options;
-  impl_->check(next, impl_->bodies);
-  impl_->take(std::move(next));
-}
-
-void Monitor::Impl::check(const MonitorOptions& next, const std::vector<Body>& with) const {
-  checkStream(next, with.size());
-  dccd::check(next.detector, with);
-  if (next.clock_body != options.clock_body) throw std::invalid_argument("clock_body must stay");
-  const MeshStore checked(next.store);
-}
-
-/// They have been checked: nothing fails.
-void Monitor::Impl::take(MonitorOptions next) noexcept {
-  static_assert(std::is_nothrow_move_assignable_v<MonitorOptions>);
-  for (MeshStore& store : stores) store.setOptions(next.store);
-  options = std::move(next);
+  checkStream(options, impl_->bodies.size());
+  check(options.detector, impl_->bodies);
+  if (options.clock_body != impl_->options.clock_body) throw std::invalid_argument("clock_body must stay");
+  // All of it or nothing: what may refuse comes first.
+  const MeshStore checked(options.store);
+  for (MeshStore& store : impl_->stores) store.setOptions(options.store);
+  impl_->options = options;
 }
 
 void Monitor::countReceived(std::size_t body, std::uint64_t count, std::uint64_t receipt_stamps) {
@@ -210,33 +199,27 @@ void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const 
   m.pending.push_back(std::move(step));
 }
 
-void Monitor::setBody(std::size_t body, Body what) { setBody(body, std::move(what), impl_->options); }
-
-void Monitor::setBody(std::size_t body, Body what, const MonitorOptions& options) {
+void Monitor::setBody(std::size_t body, Body what) {
   Impl& m = *impl_;
   if (body > m.bodies.size()) throw std::invalid_argument("there is no body " + std::to_string(body));
   if (body == m.options.clock_body) throw std::invalid_argument("clock_body must stay");
   std::vector<Body> bodies = m.bodies;
   bodies.resize(std::max(bodies.size(), body + 1));
   bodies[body] = std::move(what);
-  MonitorOptions next = options;
-  m.check(next, bodies);
-  // All of it or nothing: what may fail comes first.
-  const auto inAll = [&m](const auto& act) {
-    act(m.counters), act(m.runs), act(m.told_runs), act(m.references.positions), act(m.references.topologies);
-  };
-  inAll([&](auto& all) { all.reserve(bodies.size()); });
-  m.tracker.leave(body);
-  const bool owned = m.forgetOwnVoxels(body);
-  if (m.stores.size() < bodies.size()) m.stores.emplace_back(next.store);
-  inAll([&](auto& all) { all.resize(bodies.size()); });
+  check(m.options.detector, bodies);
+  // Should memory end before, there is no body of the new ones.
+  m.counters.resize(bodies.size());
+  m.runs.resize(bodies.size());
+  m.told_runs.resize(bodies.size());
+  m.references.positions.resize(bodies.size());
+  m.references.topologies.resize(bodies.size());
+  m.stores.resize(bodies.size(), MeshStore(m.options.store));
   m.bodies = std::move(bodies);
-  m.take(std::move(next));
   m.stores[body].clear();
   m.told_runs[body] = 0;
   m.references.positions[body] = nullptr;
   m.references.topologies[body] = nullptr;
-  if (owned) m.reduceAnew();
+  m.forgetOwnVoxels(body);
 }
 
 void Monitor::readDistancesBy(const std::vector<SpeedBound>& bounds, const std::optional<SpeedLaw>& law) {

@@ -96,8 +96,6 @@ struct Monitor::Impl {
   }
 
   Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
-  void check(const MonitorOptions& next, const std::vector<Body>& with) const;
-  void take(MonitorOptions next) noexcept;
   bool isStream(std::size_t body) const { return bodies.at(body).motion == BodyMotionKind::STREAM; }
   /// All or nothing. Counts the frame, or has it told as a step.
   StepStatus push(std::size_t body, MeshFrame frame, std::int64_t now_ns);
@@ -158,9 +156,7 @@ struct Monitor::Impl {
   void followOwnVoxels(StampNs stamp_ns);
   void tellBetweenSteps();
   void limitMapsToCome();
-  /// All or nothing. Whether the map in force is to be reduced anew.
-  bool forgetOwnVoxels(std::size_t body);
-  void reduceAnew() noexcept;
+  void forgetOwnVoxels(std::size_t body);
   /// Whether it can be used together with the one that is trusted; else there is none.
   bool fitsTrusted(const ObstacleMap& next);
   void settleDoubt(Step& step, const Deadline& deadline);

@@ -213,17 +213,12 @@ bool Monitor::Impl::fitsTrusted(const ObstacleMap& next) {
 }
 
 /// From the next step on what was the body's own is an obstacle, as far as the map in force shows it.
-bool Monitor::Impl::forgetOwnVoxels(std::size_t body) {
+void Monitor::Impl::forgetOwnVoxels(std::size_t body) {
   awaitTelling();
   finishTelling();
-  return own_voxels.forgetBody(static_cast<std::uint16_t>(body)) && map.surface;
-}
-
-void Monitor::Impl::reduceAnew() noexcept try {
-  const ObstacleMap before = std::exchange(map, ObstacleMap());
+  if (!own_voxels.forgetBody(static_cast<std::uint16_t>(body)) || !map.surface) return;
+  const ObstacleMap before = std::exchange(map, ObstacleMap());  // should memory end, there is none until the next one
   map = own_voxels.reducedAnew(before, trusted.surface.get(), tracked(), options.own_voxels_trust);
-} catch (const std::bad_alloc&) {
-  // There is no map until the next one.
 }
 
 /// What is in doubt matters to a step that would touch it, were it an obstacle.

@@ -37,7 +37,6 @@ void OwnVoxelFinder::forget() {
 }
 
 bool OwnVoxelFinder::forgetBody(std::uint16_t body) {
-  remembered_.reserve(remembered_.size() + stated_.size());  // nothing else fails
   shapes_.erase(body);
   first_.erase(body);
   last_frames_.erase(body);

@@ -90,13 +90,6 @@ void PatchTracker::seam(std::size_t body) {
   if (body == ALL) has_last_ = false;
 }
 
-void PatchTracker::leave(std::size_t body) {
-  seam(body);
-  for (auto at = cut_off_expected_.begin(); at != cut_off_expected_.end();) {
-    at = isOf(at->first, body) ? cut_off_expected_.erase(at) : std::next(at);
-  }
-}
-
 void PatchTracker::expect(const std::vector<Expectation>& expected) {
   if (expected == expected_) return;
   expected_ = expected;

@@ -22,8 +22,6 @@ class PatchTracker {
 
   /// Frames begin anew, of one body or of all: what lives there ends, nobody knows when. Told with the next outcome.
   void seam(std::size_t body = ALL);
-  /// The body is another one from here on: what touched it says nothing of that one.
-  void leave(std::size_t body);
   /// What is expected in the steps that are followed from here on.
   void expect(const std::vector<Expectation>& expected);
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:

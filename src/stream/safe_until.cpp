@@ -189,23 +189,20 @@ void PromiseWatch::extend(const Outcome& outcome, const SafeUntil& later,
 
 void PromiseWatch::revoke(const std::string& why) {
   if (!step_) return;
-  std::string broken = why, revoked = why;  // what may fail comes first
   promise_.stamp_ns = step_->stamp_ns;
   forget(why);
-  broken_ = std::move(broken);
-  revoked_ = std::move(revoked);
+  broken_ = revoked_ = why;
   ++counts_.broken;
 }
 
 void PromiseWatch::forget(const std::string& why) {
-  std::string reason = why;
   step_ = nullptr;
   obstacle_ = nullptr;
   why_void_ = nullptr;
   const StampNs stamp_ns = promise_.stamp_ns;
   promise_ = {};
   promise_.stamp_ns = promise_.until_ns = promise_.others_until_ns = stamp_ns;
-  promise_.reason = std::move(reason);
+  promise_.reason = why;
   broken_.clear();
   revoked_.clear();
 }

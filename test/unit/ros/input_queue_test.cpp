@@ -140,27 +140,6 @@ TEST(InputQueue, ACallThatTimesOutIsDoneLaterAndSaysSo) {
   EXPECT_TRUE(done);
 }
 
-// It was carried out though it was answered as refused, where the worker took it just before the time was over.
-TEST(InputQueue, ACallThatMayNotBeLateIsCarriedOutOrRefused) {
-  InputQueue queue(1, 1, QueuePolicy::NEWEST);
-  bool done = false;
-  const auto run = [&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1300));
-    done = true;
-    return Reply{true, "done"};
-  };
-  const Reply late = queue.call(run, 0.01, false);
-  EXPECT_FALSE(late.success);
-  EXPECT_NE(late.message.find("will not be done"), std::string::npos) << late.message;
-  serve(queue);
-  EXPECT_FALSE(done);
-  std::thread worker([&] { serve(queue); });
-  const Reply begun = queue.call(run, 1, false);
-  worker.join();
-  EXPECT_TRUE(begun.success) << begun.message;
-  EXPECT_TRUE(done);
-}
-
 TEST(InputQueue, ClosingEndsCallsAtOnce) {
   InputQueue queue(1, 1, QueuePolicy::NEWEST);
   Reply reply{true, ""};

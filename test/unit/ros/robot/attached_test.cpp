@@ -7,7 +7,6 @@
 #include "robot_texts.h"
 #include "support/folder_test.h"
 #include "support/shapes.h"
-#include "unit/failing_allocations.h"
 
 namespace dccd {
 namespace test {
@@ -44,15 +43,6 @@ class Attached : public FolderTest {
     const ros::Time stamp(stamp_s);
     driven_->tell({above("palm", -9, stamp), above("tool", tool_z, stamp)});
     return driven_->feed(stamp_s, cloth_z);
-  }
-  /// A frame of this stamp, received so on the clock of stamps and on that of arrivals; its transforms come before it.
-  const Outcome& receive(double stamp_s, double receipt_s, std::int64_t arrival_ns) {
-    const ros::Time stamp(stamp_s);
-    driven_->tell({above("palm", -9, stamp), above("tool", 0, stamp)});
-    const auto receipt_ns = static_cast<StampNs>(receipt_s * 1e9);
-    pipeline().take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, 0.8f), receipt_ns, arrival_ns});
-    EXPECT_TRUE(pipeline().nextOutcome(arrival_ns, driven_->outcome));
-    return driven_->outcome;
   }
   Assurance said() const { return assuranceOf(driven_->outcome); }
   /// Voxels of 0.1 m: far away, at (0.05, 0.05, 0.25), and so many beside each other in the plane z = 0.35.
@@ -124,68 +114,12 @@ TEST_F(Attached, StepsThatBeganBeforeTheCallProveNothing) {
   attach(plate());
   feed(1.1, 0, 0.8f);
   ASSERT_TRUE((feed(1.2, 0, 0.8f), said().clear())) << describe(said());
-  pipeline().callsComeAt({1'450'000'000});
+  pipeline().callsComeAt(1'450'000'000);
   pipeline().detach("plate");
   for (const double stamp_s : {1.3, 1.4, 1.5, 1.6, 1.7}) {
     feed(stamp_s, 0, 0.8f);
     EXPECT_EQ(said().clear(), stamp_s > 1.55) << stamp_s << " " << describe(said());
     if (!said().clear()) EXPECT_TRUE(says(said().missing, "after this step began object 'plate' was detached"));
-  }
-}
-
-// In a bag that is played in a loop nothing was proved any more until the stamps passed the call's.
-TEST_F(Attached, ACallEndsTheProofOfWhatCameBeforeItAndOfNothingElse) {
-  struct Frame {
-    double stamp_s, receipt_s;
-    std::int64_t arrival_ns;
-    bool clear;
-  };
-  struct Case {
-    std::string what;
-    double begin_s, call_s;
-    std::int64_t call_arrival_ns;
-    std::vector<Frame> frames;
-  };
-  const double wall_s = 1e9;
-  const Case cases[] = {
-      {"a bag in a loop", 4.7, 4.95, 9, {{0.1, 0.11, 10, false}, {0.2, 0.21, 11, true}, {0.3, 0.31, 12, true}}},
-      {"the next loops",
-       4.7,
-       4.85,
-       9,
-       {{4.9, 4.91, 10, false}, {5, 5.01, 11, true}, {0.1, 0.11, 12, false}, {0.2, 0.21, 13, true}}},
-      {"a simulation that begins anew", 100, 100.25, 9, {{0.1, 0.11, 10, false}, {0.2, 0.21, 11, true}}},
-      {"a loop without its clock", 4.7, wall_s, 9, {{0.1, wall_s, 10, false}, {0.2, wall_s, 11, true}}},
-      {"on its way", 4.7, 4.95, 9, {{4.9, 4.97, 10, false}, {5, 5.01, 11, false}, {5.1, 5.11, 12, true}}},
-      {"on its way, and the clock goes back",
-       4.7,
-       4.97,
-       9,
-       {{4.9, 0.01, 10, false}, {4.95, 0.02, 11, false}, {0.1, 0.11, 12, false}, {0.2, 0.21, 13, true}}},
-      {"made after the clock went back",
-       100,
-       0.5,
-       9,
-       {{0.4, 0.52, 10, false}, {0.45, 0.53, 11, false}, {0.6, 0.61, 12, false}, {0.7, 0.71, 13, true}}},
-      {"frames that wait in the queue",
-       4.7,
-       wall_s,
-       9,
-       {{4.9, wall_s, 8, false}, {5, wall_s, 9, false}, {5.1, wall_s, 10, false}, {5.2, wall_s, 11, true}}},
-  };
-  for (const Case& one : cases) {
-    start();
-    for (int i = 0; i < 2; ++i) {
-      const double stamp_s = one.begin_s + 0.1 * i;
-      receive(stamp_s, one.call_s == wall_s ? wall_s : stamp_s + 0.01, 1 + i);
-    }
-    ASSERT_TRUE(said().clear()) << describe(said());
-    pipeline().callsComeAt({static_cast<StampNs>(one.call_s * 1e9), one.call_arrival_ns});
-    attach(plate());
-    for (const Frame& frame : one.frames) {
-      receive(frame.stamp_s, frame.receipt_s, frame.arrival_ns);
-      EXPECT_EQ(said().clear(), frame.clear) << one.what << ", " << frame.stamp_s << ": " << describe(said());
-    }
   }
 }
 
@@ -211,7 +145,7 @@ TEST_F(Attached, WhatIsLetGoStaysWhereItsLinkWasAtTheCall) {
   feed(1, 0, 0.8f);
   attach(plate());
   feed(1.1, 0, 0.8f);
-  pipeline().callsComeAt({1'250'000'000});
+  pipeline().callsComeAt(1'250'000'000);
   pipeline().detach("plate");
   feed(1.2, 0.1, 0.8f);
   EXPECT_NEAR(heightOf(2), 0.6, 2e-3) << "still held";
@@ -222,130 +156,6 @@ TEST_F(Attached, WhatIsLetGoStaysWhereItsLinkWasAtTheCall) {
     EXPECT_NEAR(heightOf(2), 0.65, 2e-3) << at;
   }
   EXPECT_TRUE(said().clear()) << describe(said());
-}
-
-// It rode on with the hand until that stamp came again.
-TEST_F(Attached, WhatIsLetGoBeforeTimeBeginsAnewStaysThereOrHasNoPlace) {
-  for (const bool is_known : {true, false}) {
-    start();
-    feed(4.8, 0, 0.8f);
-    attach(plate());
-    feed(4.9, 0, 0.8f);
-    driven_->tell({above("tool", 0.2, ros::Time(5))});
-    pipeline().callsComeAt({4'950'000'000});
-    pipeline().detach("plate");
-    // Where tf begins anew before a frame does, where the hand was is forgotten.
-    if (is_known) driven_->take(0, cloud(0.1, 0.8f));
-    driven_->tell({above("palm", -9, ros::Time(0.1)), above("tool", 0.3, ros::Time(0.1))});
-    if (!is_known) driven_->take(0, cloud(0.1, 0.8f));
-    ASSERT_TRUE(pipeline().nextOutcome(0, driven_->outcome));
-    feed(0.2, 0.35, 0.8f);
-    feed(0.3, 0.2, 0.8f);
-    EXPECT_NEAR(heightOf(2), is_known ? 0.6 : 0.8, 2e-3);
-    EXPECT_EQ(said().clear(), is_known) << describe(said());
-    if (is_known) continue;
-    EXPECT_TRUE(says(said().missing, "time went back before tf had come to where it was let go")) << describe(said());
-    pipeline().callsComeAt({350'000'000});
-    pipeline().remove("plate");
-    for (const double at : {0.4, 0.5}) feed(at, 0.2, 0.8f);
-    EXPECT_TRUE(said().clear()) << describe(said());
-  }
-}
-
-// It was let go where the hand had been at the newest frame, ten seconds before.
-TEST_F(Attached, WhatIsLetGoInTheSilenceOfTheClockBodyStaysWhereItsLinkWasAtTheCall) {
-  start();
-  feed(1, 0, 0.8f);
-  attach(plate());
-  feed(1.1, 0, 0.8f);
-  for (const auto& [at, tool_z] : {std::pair(14.0, 0.1), std::pair(14.1, 0.3)}) {
-    driven_->tell({above("palm", -9, ros::Time(at)), above("tool", tool_z, ros::Time(at))});
-  }
-  pipeline().callsComeAt({14'050'000'000});
-  pipeline().detach("plate");
-  for (const double at : {14.2, 14.3}) feed(at, 0, 0.8f);
-  EXPECT_NEAR(heightOf(2), 0.7, 2e-3);
-  EXPECT_TRUE(said().clear()) << describe(said());
-}
-
-// The contact of the one that went was expected until then; the other one's was there when it came.
-TEST_F(Attached, WhatTheOneThatWentTouchedIsNoNewsOfTheNextInItsPlace) {
-  start();
-  double stamp_s = 1;
-  const auto feedThrough = [&](float cloth_z) {
-    const ros::Time stamp(stamp_s += 0.1);
-    driven_->tell({above("palm", -9, stamp), above("tool", 0, stamp)});
-    driven_->feed(stamp_s, cloth_z, {}, "world", 0.01f);
-  };
-  feedThrough(0.6f);
-  Request request = plate();
-  request.touches = {"mesh"};
-  attach(request);
-  feedThrough(0.6f);
-  feedThrough(0.485f);
-  ASSERT_EQ(driven_->outcome.patches.size(), 1u) << describe(said());
-  ASSERT_TRUE(driven_->outcome.patches[0].isExpected());
-  pipeline().remove("plate");
-  attach(plate("other"));
-  feedThrough(0.485f);
-  ASSERT_EQ(driven_->outcome.patches.size(), 1u) << describe(said());
-  EXPECT_FALSE(driven_->outcome.patches[0].isExpected());
-  EXPECT_EQ(said().touching, Touching::LASTING) << describe(said());
-}
-
-// Half of it left an object that was let go and expected all the same, or a body that nobody could remove.
-TEST_F(Attached, ACallForWhichThereIsNoMemoryChangesNothing) {
-  const auto begin = [&] {
-    start(robotScene("against_links: true",
-                     "effects: {octomap: 'off'}, max_speed_m_s: 5, "
-                     "expected_contacts: [{between: [mesh, palm], phase: lay}]"));
-    feed(1, 0, 0.8f);
-    Request held = plate();
-    held.touches = {"palm"};
-    attach(held);
-    for (const double at : {1.1, 1.2}) feed(at, 0, 0.8f);
-    ASSERT_TRUE(said().clear()) << describe(said());
-    pipeline().takeVoided();
-  };
-  Request other = plate("other");
-  other.pose.position.z = 1;
-  other.touches = {"palm"};
-  begin();
-  const AttachedObject object = readAttach(other, pipeline().config());
-  const std::pair<std::string, std::function<void()>> calls[] = {
-      {"attach", [&] { pipeline().attach(object); }},
-      {"detach", [&] { pipeline().detach("plate"); }},
-      {"remove", [&] { pipeline().remove("plate"); }},
-      {"set_phase", [&] { pipeline().setPhase("lay"); }},
-  };
-  for (const auto& [name, call] : calls) {
-    begin();
-    const std::string before = pipeline().phaseInWords();
-    call();
-    const std::string after = pipeline().phaseInWords();
-    ASSERT_NE(after, before);
-    const auto failAt = [&, &call = call, &name = name](int n, bool lasts) {
-      begin();
-      bool is_done = false;
-      const bool met = failsAt(n, lasts, [&] { call(), is_done = true; });
-      EXPECT_EQ(pipeline().phaseInWords(), is_done ? after : before) << name;
-      EXPECT_EQ(pipeline().takeVoided().empty(), !is_done) << name;
-      EXPECT_EQ(pipeline().promises().promise().isPromise(), !is_done) << name;
-      for (const double at : {1.3, 1.4}) feed(at, 0.2, 0.8f);
-      if (!is_done) {
-        EXPECT_NEAR(heightOf(2), 0.7, 2e-3) << name << ": it is held";
-        EXPECT_TRUE(said().clear()) << name << ": " << describe(said());
-        call();
-        EXPECT_EQ(pipeline().phaseInWords(), after) << name;
-      }
-      for (const double at : {1.5, 1.6}) feed(at, 0.2, 0.8f);
-      EXPECT_TRUE(said().clear()) << name << ": " << describe(said());
-      return met;
-    };
-    for (const bool lasts : {false, true}) {
-      EXPECT_GT(failingEverywhere([&](int n) { return failAt(n, lasts); }), 10) << name;
-    }
-  }
 }
 
 // The cloth hangs through the palm all the while.
@@ -363,7 +173,7 @@ TEST_F(Attached, OtherBodiesLoseNoStepAndNoPatchByIt) {
   ASSERT_EQ(before.patches.size(), 1u) << describe(said());
   std::uint64_t sequence = before.sequence;
   const auto expectGoesOn = [&](const std::string& call, const std::function<void()>& change) {
-    pipeline().callsComeAt({static_cast<StampNs>((stamp_s + 0.05) * 1e9)});
+    pipeline().callsComeAt(static_cast<StampNs>((stamp_s + 0.05) * 1e9));
     change();
     for (const bool is_seam : {true, false}) {
       feedNext(-0.01f);
