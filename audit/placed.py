@@ -5,7 +5,7 @@ by itself, its translation straight, its rotation about one axis, between the tw
 known before the first sample of a moving joint or after its last one. A static frame has one place, from when it came.
 """
 import bisect
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -353,17 +353,13 @@ class LetGo(Rigid):
     moves = False
 
     def __init__(self, track, stamp):
-        super().__init__(track.name, track.mesh, track.transforms, track.fixed)
-        self.stamp = stamp
+        super().__init__(track.name, replace(track.mesh, frame=track.fixed), track.transforms, track.fixed)
+        self.held, self.stamp = track, stamp
 
-    def knots(self, start, end):
-        return []
-
-    @once
     def at(self, stamp, start, end):
-        return carried(self.transforms.pose(self.mesh.frame, self.fixed, self.stamp), self.mesh.positions)
+        return self.held.at(self.stamp, start, end)
 
-    def turns(self, start, end):
+    def exact(self, start, end):
         return False
 
 

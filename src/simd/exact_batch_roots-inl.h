@@ -111,6 +111,21 @@ struct MoveTogether {
   }
 };
 
+/// The lanes of the vector at i that are pairs, not copies of the last one.
+HWY_INLINE unsigned pairsOf(const RootBlock& roots, std::size_t i) {
+  return roots.count - i < lanes() ? (1u << (roots.count - i)) - 1 : (1u << lanes()) - 1;
+}
+
+/// Appends these lanes of the vector at i to the `count` that were moved before.
+template <class Block>
+HWY_INLINE void moveTogether(Block& roots, std::size_t i, unsigned which, std::size_t& count) {
+  if (which == 0) return;
+  onPlanes(roots, MoveTogether{hn::SetTableIndices(Tag(), FRONT_TABLE.row[which]), i, count});
+  for (unsigned bits = which; bits != 0; bits &= bits - 1) {
+    roots.pair[count++] = roots.pair[i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)];
+  }
+}
+
 /// Every pair's root_lo is in [0,1], so that the conversion is defined: of a pair without a root it is 0 or another's.
 HWY_INLINE void writeOut(const RootBlock& roots, std::size_t j, double cells, const BatchOutput& out) {
   const std::size_t pair = roots.pair[j];
@@ -222,7 +237,7 @@ HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, HardBlock& hard, c
     for (std::size_t i = 0; i < roots.count; i += lanes()) {
       selectPiece(roots, i);
       const V outcome = load(roots.outcome, i);
-      const unsigned all = roots.count - i < lanes() ? (1u << (roots.count - i)) - 1 : (1u << lanes()) - 1;
+      const unsigned all = pairsOf(roots, i);
       const unsigned waiting = all & bitsOf(hn::Eq(outcome, constant(ROOT_PENDING)));
       const M left = hn::Or(hn::Eq(outcome, constant(ROOT_UNCERTAIN)), hn::Eq(outcome, constant(ROOT_NOT_BRACKETED)));
       const unsigned uncertain = CERTIFIED ? all & bitsOf(left) : 0;
@@ -232,11 +247,7 @@ HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, HardBlock& hard, c
       for (unsigned bits = all & ~waiting & ~uncertain; bits != 0; bits &= bits - 1) {
         writeOut(roots, i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits), cells, out);
       }
-      if (waiting == 0) continue;
-      onPlanes(roots, MoveTogether{hn::SetTableIndices(Tag(), FRONT_TABLE.row[waiting]), i, pending});
-      for (unsigned bits = waiting; bits != 0; bits &= bits - 1) {
-        roots.pair[pending++] = roots.pair[i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)];
-      }
+      moveTogether(roots, i, waiting, pending);
     }
     roots.count = pending;
     fillUp(roots);

@@ -117,8 +117,8 @@ HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
   return choose(rests, constant(1), choose(hn::And(at_start, at_end), constant(SMALLEST_INTERVAL_AT_ENDS), one_end));
 }
 
-/// What one vector of intervals holds: certainly nothing, where no root is or the features are apart, one root, or
-/// perhaps more. The lanes with one root.
+/// Says what one vector of intervals holds: nothing, where certainly no root is or the features are apart, one root, or
+/// perhaps more. Returns the lanes with one root.
 template <BatchKind KIND>
 HWY_INLINE unsigned lookAt(HardBlock& hard, std::size_t i) {
   const V third = constant(1.0 / 3), from = load(hard.from, i);
@@ -156,6 +156,11 @@ HWY_INLINE void lookCloser(HardBlock& roots, std::size_t i, double cells) {
   store(outcome, roots.outcome, i);
 }
 
+/// What settleDirected() and settleParallel() read besides what copyPair() copies.
+inline void copyRest(const HardBlock& from, std::size_t i, HardBlock& to, std::size_t j) {
+  for (int k = 0; k < MOTION_PLANES; ++k) to.rest.motion[k][j] = from.rest.motion[k][i];
+}
+
 /// Tells a pair what became of the root in its interval.
 HWY_INLINE void tell(const HardBlock& roots, std::size_t j, HardBlock& hard) {
   const std::size_t lane = roots.pair[j];
@@ -180,7 +185,7 @@ HWY_INLINE void refineRoots(HardBlock& roots, HardBlock& hard, double cells) {
       continue;
     }
     if (open != j) copyPair(roots, j, roots, open);
-    for (int k = 0; k < MOTION_PLANES; ++k) roots.rest.motion[k][open] = hard.rest.motion[k][roots.pair[j]];
+    copyRest(hard, roots.pair[j], roots, open);
     roots.root_lo[open] = roots.root_lo[j], roots.root_hi[open] = roots.root_hi[j];
     roots.outcome[open++] = ROOT_UNCERTAIN;
   }
@@ -213,7 +218,7 @@ template <BatchKind KIND>
 HWY_INLINE void takeOut(HardBlock& hard, HardBlock& parallel, double cells, const BatchOutput& out) {
   std::size_t pending = 0;
   for (std::size_t i = 0; i < hard.count; i += lanes()) {
-    const unsigned all = hard.count - i < lanes() ? (1u << (hard.count - i)) - 1 : (1u << lanes()) - 1;
+    const unsigned all = pairsOf(hard, i);
     const unsigned waiting = all & bitsOf(hn::Eq(load(hard.outcome, i), constant(ROOT_PENDING)));
     for (unsigned bits = all & ~waiting; bits != 0; bits &= bits - 1) {
       const std::size_t j = i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
@@ -222,17 +227,11 @@ HWY_INLINE void takeOut(HardBlock& hard, HardBlock& parallel, double cells, cons
         continue;
       }
       copyPair(hard, j, parallel, parallel.count);
-      for (int k = 0; k < MOTION_PLANES; ++k) parallel.rest.motion[k][parallel.count] = hard.rest.motion[k][j];
+      copyRest(hard, j, parallel, parallel.count);
       parallel.root_lo[parallel.count] = parallel.root_hi[parallel.count] = 0;
       parallel.outcome[parallel.count++] = ROOT_UNCERTAIN;
     }
-    if (waiting == 0) continue;
-    if (waiting != all || pending != i) {
-      onPlanes(hard, MoveTogether{hn::SetTableIndices(Tag(), FRONT_TABLE.row[waiting]), i, pending});
-    }
-    for (unsigned bits = waiting; bits != 0; bits &= bits - 1) {
-      hard.pair[pending++] = hard.pair[i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)];
-    }
+    moveTogether(hard, i, waiting, pending);
   }
   hard.count = pending;
   fillUp(hard);

@@ -475,9 +475,8 @@ class CellTest(FolderTestCase):
     def test_objects_that_a_call_brings_and_takes(self):
         self.cell('called', lowest=0.1)
         rod, far = self.folder / 'rod.obj', self.folder / 'far.obj'
-        moved = lambda by: ''.join('v %r %r %r\n' % tuple(p) for p in (worlds.FINGER + by).tolist()) + worlds.FINGER_OBJ[worlds.FINGER_OBJ.index('f'):]
-        rod.write_text(moved((0.056, 0.192, 0.05)))  # in the cloth, when that has come down
-        far.write_text(moved((0.056, 0.192, 1)))
+        rod.write_text(worlds.tetrahedron((0.056, 0.192, 0.05)))  # in the cloth, when that has come down
+        far.write_text(worlds.tetrahedron((0.056, 0.192, 1)))
         at = lambda k: rospy.Time(100 + k // 10, k % 10 * 10 ** 8 + 1)
         listed = lambda message: message.bodies.append('rod') if message.header.stamp > at(8) else None
         before = list(self.said)
@@ -495,6 +494,8 @@ class CellTest(FolderTestCase):
         self.refuted('state', lambda message: None, 'clear', 'rod, which came or went by a call')
         self.call(at(7) + rospy.Duration(0, 1), 'remove', 'rod')
         self.holds()
+        self.call(at(8), 'set_hold', 'cloth')
+        self.not_covered('~set_hold was called')
 
     def test_the_phase_that_a_call_sets(self):
         self.cell('phase', 'expected_contacts: [{between: [cloth, plate], phase: lay}]\n')

@@ -17,8 +17,14 @@ from visualization_msgs.msg import Marker
 
 NS, START = 10 ** 9, 1000 * 10 ** 9
 FINGER = np.array([[-.03, -.03, -.03], [.03, -.03, -.03], [0, .03, -.03], [0, 0, .03]])
-FINGER_OBJ = ''.join('v %r %r %r\n' % tuple(p) for p in FINGER.tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
-ROD_OBJ = ''.join('v %r %r %r\n' % tuple(p) for p in (FINGER + (0, 0, .09)).tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
+
+
+def tetrahedron(by=(0, 0, 0)):
+    """A finger, moved, as the text of an OBJ."""
+    return ''.join('v %r %r %r\n' % tuple(p) for p in (FINGER + by).tolist()) + 'f 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n'
+
+
+FINGER_OBJ, ROD_OBJ = tetrahedron(), tetrahedron((0, 0, .09))
 ROBOT = ('<robot name="arm"><link name="base"/><link name="tool"><collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link>'
          '<link name="wrist"><collision><origin xyz="0 0 0.1" rpy="0.3 0 0"/><geometry><cylinder radius="0.03" length="0.06"/></geometry></collision></link>'
          '<joint name="j" type="floating"><parent link="base"/><child link="tool"/></joint><joint name="swing" type="revolute"><parent link="base"/>'
